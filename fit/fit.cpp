@@ -1,0 +1,429 @@
+#include "fit/fit.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "fit/dual_model.h"
+#include "reference/json_reader.h"
+#include "reference/sample_points.h"
+
+namespace lobefit {
+
+namespace {
+
+/// Which variable of the solver drives which slots of the model's flat parameters.
+struct Variables {
+  std::vector<std::string> names;
+  std::vector<double> lower, upper, start;
+  std::vector<int> variable_of_slot;
+};
+
+constexpr std::array<const char*, 3> channel_suffixes{".r", ".g", ".b"};
+
+Variables make_variables(const ParameterValues& values, const TableModel& on_table, const FitOptions& options,
+                         int channels) {
+  Variables variables;
+  variables.variable_of_slot.assign(values.flat().size(), -1);
+  for (const std::string& name : options.free) {
+    const ParameterInfo& info = values.info(name);
+    const auto offset = static_cast<std::size_t>(info.offset);
+    if (on_table.set_by_axis(offset)) {
+      throw Error(ExitCode::usage, "parameter '" + name + "' can't be free", values.owner(),
+                  "an axis of the table sets it; leave it out of --free");
+    }
+    if (variables.variable_of_slot[offset] >= 0) {
+      throw Error(ExitCode::usage, "parameter '" + name + "' is free twice", values.owner(), "name it once");
+    }
+    const bool per_channel = info.components == 3 && channels == 3;
+    for (int c = 0; c < info.components; ++c) {
+      const std::size_t slot = offset + static_cast<std::size_t>(c);
+      if (c == 0 || per_channel) {
+        variables.names.push_back(name + (per_channel ? channel_suffixes[static_cast<std::size_t>(c)] : ""));
+        variables.lower.push_back(info.lower);
+        variables.upper.push_back(info.upper);
+        variables.start.push_back(values.flat()[slot]);
+      }
+      variables.variable_of_slot[slot] = static_cast<int>(variables.names.size()) - 1;
+    }
+  }
+  return variables;
+}
+
+/// Entries of one parameter row, small enough to be one unit of parallel work.
+struct Batch {
+  std::size_t parameter_row;
+  std::size_t first_residual;
+  std::vector<std::size_t> entries;
+  std::vector<Direction> wi, wo;
+  std::vector<double> root_weight, cos_theta_i;
+};
+
+constexpr std::size_t batch_size = 1024;
+
+struct RobustResidual {
+  double value, slope;
+};
+
+/// √ρ(s²) with the sign of s, and its derivative: squaring it gives the loss. ρ as in Ceres: Huber, Cauchy.
+RobustResidual robust(Loss loss, double scale, double residual) {
+  const double s = residual / scale;
+  const double magnitude = std::abs(s);
+  switch (loss) {
+    case Loss::none: return {residual, 1.0};
+    case Loss::huber: {
+      if (magnitude <= 1.0) return {residual, 1.0};
+      const double root = std::sqrt(2.0 * magnitude - 1.0);
+      return {std::copysign(scale * root, residual), 1.0 / root};
+    }
+    case Loss::cauchy: {
+      if (magnitude < 1e-8) return {residual, 1.0};
+      const double root = std::sqrt(std::log1p(s * s));
+      return {std::copysign(scale * root, residual), magnitude / ((1.0 + s * s) * root)};
+    }
+  }
+  return {residual, 1.0};
+}
+
+/// The fit as a least-squares problem over a set of entries.
+class TableProblem {
+ public:
+  TableProblem(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
+               const std::vector<double>& weights)
+      : dual_(dual_model(model)), table_(table), options_(options), on_table_(model, values, table, options.mappings),
+        variables_(make_variables(values, on_table_, options, table.channels)) {
+    for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+      if (weights[entry] == 0.0) continue;
+      const std::size_t row = table.parameter_row(entry);
+      if (batches_.empty() || batches_.back().parameter_row != row || batches_.back().entries.size() == batch_size) {
+        batches_.push_back({.parameter_row = row, .first_residual = residual_count_});
+      }
+      Batch& batch = batches_.back();
+      batch.entries.push_back(entry);
+      batch.wi.push_back(table.wi(entry));
+      batch.wo.push_back(table.wo(entry));
+      batch.cos_theta_i.push_back(batch.wi.back().z);
+      batch.root_weight.push_back(std::sqrt(weights[entry] / table.channels));
+      residual_count_ += static_cast<std::size_t>(table.channels);
+    }
+  }
+
+  const Variables& variables() const { return variables_; }
+
+  LeastSquaresProblem problem(std::vector<double> start) const {
+    LeastSquaresProblem result;
+    result.residual_count = residual_count_;
+    result.names = variables_.names;
+    result.lower = variables_.lower;
+    result.upper = variables_.upper;
+    result.start = std::move(start);
+    result.evaluate = [this](std::span<const double> x, std::span<double> residuals, double* jacobian) {
+      return evaluate(x, residuals, jacobian);
+    };
+    const bool has_errors = std::any_of(table_.stderr_values.begin(), table_.stderr_values.end(),
+                                        [](float error) { return error > 0.0f; });
+    if (has_errors) {
+      result.degrees_of_freedom = table_.replicates.empty() ? 0 : replicate_count - 1;
+      result.gradient_covariance = [this](std::span<const double> x, std::span<const double> jacobian) {
+        return gradient_covariance(x, jacobian);
+      };
+    }
+    return result;
+  }
+
+ private:
+  std::vector<double> flat_parameters(const Batch& batch, std::span<const double> x) const {
+    std::vector<double> flat = on_table_.row(batch.parameter_row);
+    for (std::size_t s = 0; s < flat.size(); ++s) {
+      if (variables_.variable_of_slot[s] >= 0) flat[s] = x[static_cast<std::size_t>(variables_.variable_of_slot[s])];
+    }
+    return flat;
+  }
+
+  bool evaluate(std::span<const double> x, std::span<double> residuals, double* jacobian) const {
+    const std::size_t p = x.size();
+    const auto channels = static_cast<std::size_t>(table_.channels);
+    std::vector<char> finite(batches_.size(), 1);
+    tbb::parallel_for(std::size_t{0}, batches_.size(), [&](std::size_t index) {
+      const Batch& batch = batches_[index];
+      const std::size_t n = batch.entries.size();
+      const std::vector<double> flat = flat_parameters(batch, x);
+      std::vector<double> values(channels * n), derivatives(channels * n * dual_width);
+      for (std::size_t first = 0; first == 0 || (jacobian && first < p); first += dual_width) {
+        dual_.evaluate(flat, variables_.variable_of_slot, static_cast<int>(first), batch.wi, batch.wo, table_.channels,
+                       values.data(), derivatives.data());
+        for (std::size_t c = 0; c < channels; ++c) {
+          for (std::size_t i = 0; i < n; ++i) {
+            const std::size_t row = batch.first_residual + i * channels + c;
+            const ValueAndSlope model = transform(options_.quantity, values[c * n + i], batch.cos_theta_i[i]);
+            const double target = transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)),
+                                            batch.cos_theta_i[i]).value;
+            const RobustResidual residual = robust(options_.loss, options_.loss_scale, model.value - target);
+            residuals[row] = batch.root_weight[i] * residual.value;
+            if (!std::isfinite(residuals[row])) finite[index] = 0;
+            if (!jacobian) continue;
+            const double slope = batch.root_weight[i] * residual.slope * model.slope;
+            for (std::size_t k = first; k < std::min(p, first + dual_width); ++k) {
+              jacobian[row * p + k] = slope * derivatives[(c * n + i) * dual_width + k - first];
+            }
+          }
+        }
+      }
+    });
+    return std::all_of(finite.begin(), finite.end(), [](char f) { return f != 0; });
+  }
+
+  /// Covariance of Jᵀr under the table's error. Jᵀ moves with the data only where the loss bends, which is left out.
+  std::vector<double> gradient_covariance(std::span<const double> x, std::span<const double> jacobian) const {
+    const std::size_t p = x.size();
+    std::vector<double> covariance(p * p, 0.0);
+    const auto add_product = [&](const std::vector<double>& g, double factor) {
+      for (std::size_t k = 0; k < p; ++k) {
+        for (std::size_t l = 0; l < p; ++l) covariance[k * p + l] += factor * g[k] * g[l];
+      }
+    };
+    std::vector<double> g(p);
+    const auto replicates = static_cast<int>(table_.replicates.size() / table_.values.size());
+    if (replicates > 0) {
+      for (int r = 0; r < replicates; ++r) {
+        std::fill(g.begin(), g.end(), 0.0);
+        for_each_residual(x, [&](std::size_t row, const Batch& batch, std::size_t i, int c, double slope) {
+          const double difference = slope * (table_.replicate(r, batch.entries[i], c) - table_.value(batch.entries[i], c));
+          for (std::size_t k = 0; k < p; ++k) g[k] += jacobian[row * p + k] * difference;
+        });
+        add_product(g, 1.0 / (replicates * (replicates - 1.0)));
+      }
+    } else {
+      for_each_residual(x, [&](std::size_t row, const Batch& batch, std::size_t i, int c, double slope) {
+        const double error = slope * table_.standard_error(batch.entries[i], c);
+        for (std::size_t k = 0; k < p; ++k) g[k] = jacobian[row * p + k] * error;
+        add_product(g, 1.0);
+      });
+    }
+    return covariance;
+  }
+
+  /// Calls visit(row, batch, i, channel, d residual / d table value) for every residual.
+  template <class Visit>
+  void for_each_residual(std::span<const double>, Visit&& visit) const {
+    for (const Batch& batch : batches_) {
+      for (std::size_t i = 0; i < batch.entries.size(); ++i) {
+        for (int c = 0; c < table_.channels; ++c) {
+          const double slope =
+              transform(options_.quantity, table_.value(batch.entries[i], c), batch.cos_theta_i[i]).slope;
+          visit(batch.first_residual + i * static_cast<std::size_t>(table_.channels) + static_cast<std::size_t>(c),
+                batch, i, c, batch.root_weight[i] * slope);
+        }
+      }
+    }
+  }
+
+  const DualModel& dual_;
+  const Table& table_;
+  const FitOptions& options_;
+  TableModel on_table_;
+  Variables variables_;
+  std::vector<Batch> batches_;
+  std::size_t residual_count_ = 0;
+};
+
+/// Start number `index` > 0: a scrambled Sobol pair per two variables, inside the ranges.
+std::vector<double> further_start(const Variables& variables, std::uint64_t seed, int index) {
+  std::vector<double> start(variables.start.size());
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    const SamplePoints points(Sampler::sobol, {seed, i / 2, 0});
+    const double u = points(static_cast<std::uint32_t>(index))[i % 2];
+    start[i] = variables.lower[i] + u * (variables.upper[i] - variables.lower[i]);
+  }
+  return start;
+}
+
+std::vector<FitMetric> all_metrics(const Table& table, std::span<const float> values, const std::vector<double>& weights) {
+  std::vector<FitMetric> metrics;
+  for (std::size_t q = 0; q < quantity_names.size(); ++q) {
+    metrics.push_back({std::string(quantity_names[q]),
+                       rms_difference(table, values, static_cast<Quantity>(q), weights)});
+  }
+  return metrics;
+}
+
+void normalise(std::vector<double>& weights) {
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  if (!(sum > 0.0)) throw Error(ExitCode::usage, "no entry is left", "--holdout", "hold out a smaller fraction");
+  for (double& weight : weights) weight /= sum;
+}
+
+}  // namespace
+
+std::vector<std::string> free_parameters(const ParameterValues& values, const Table& table,
+                                         const std::vector<AxisMapping>& mappings, Tier tier) {
+  const TableModel on_table(find_model(values.owner()), values, table, mappings);
+  std::vector<std::string> names;
+  for (const ParameterInfo& info : values.list()) {
+    if (info.tier <= tier && !on_table.set_by_axis(static_cast<std::size_t>(info.offset))) names.emplace_back(info.name);
+  }
+  return names;
+}
+
+Fit fit(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
+        Monitor& monitor) {
+  std::vector<double> weights = entry_weights(table, options.weights, options.quantity);
+  std::vector<double> held_out;
+  if (options.holdout > 0.0) {
+    held_out = weights;
+    for (std::size_t entry = 0; entry < weights.size(); ++entry) {
+      const double u = SamplePoints(Sampler::philox, {options.seed, entry, 0})(0)[0];
+      (u < options.holdout ? weights : held_out)[entry] = 0.0;
+    }
+    normalise(weights);
+    normalise(held_out);
+  }
+  const TableProblem problem(model, values, table, options, weights);
+  const Variables& variables = problem.variables();
+
+  Fit result;
+  result.model = std::string(model.info->name);
+  result.options = options;
+  result.mappings = options.mappings;
+  result.starts_tried = variables.names.empty() ? 1 : options.starts;
+  monitor.begin("fit " + result.model, static_cast<std::uint64_t>(result.starts_tried));
+  for (int start = 0; start < result.starts_tried; ++start) {
+    const LeastSquaresSolution solution = solve(
+        problem.problem(start == 0 ? variables.start : further_start(variables, options.seed, start)), monitor);
+    if (start == 0 || solution.sum_of_squares < result.solution.sum_of_squares) result.solution = solution;
+    monitor.advance(1);
+  }
+  monitor.end();
+
+  ParameterValues fitted = values;
+  for (std::size_t slot = 0; slot < fitted.flat().size(); ++slot) {
+    const int variable = variables.variable_of_slot[slot];
+    if (variable >= 0) fitted.flat()[slot] = result.solution.variables[static_cast<std::size_t>(variable)].value;
+  }
+  const TableModel on_table(model, fitted, table, options.mappings);
+  for (const ParameterInfo& info : fitted.list()) {
+    const auto offset = static_cast<std::size_t>(info.offset);
+    if (on_table.set_by_axis(offset)) continue;
+    const bool grey = info.components == 1 ||
+                      (fitted.flat()[offset] == fitted.flat()[offset + 1] &&
+                       fitted.flat()[offset] == fitted.flat()[offset + 2] &&
+                       variables.variable_of_slot[offset] == variables.variable_of_slot[offset + 1]);
+    for (std::size_t c = 0; c < (grey ? 1u : 3u); ++c) {
+      FitParameter parameter{.name = std::string(info.name) + (grey ? "" : channel_suffixes[c]),
+                             .lower = info.lower, .upper = info.upper};
+      const int variable = variables.variable_of_slot[offset + c];
+      parameter.free = variable >= 0;
+      if (parameter.free) {
+        parameter.estimate = result.solution.variables[static_cast<std::size_t>(variable)];
+      } else {
+        const double value = fitted.flat()[offset + c];
+        parameter.estimate = {.value = value, .ci_low = value, .ci_high = value};
+      }
+      result.parameters.push_back(std::move(parameter));
+    }
+  }
+  const Table rendered = on_table.render();
+  result.metrics = all_metrics(table, rendered.values, weights);
+  if (!held_out.empty()) result.holdout = all_metrics(table, rendered.values, held_out);
+  return result;
+}
+
+ParameterValues Fit::values() const {
+  ParameterValues result = find_model(model).defaults();
+  for (const FitParameter& parameter : parameters) {
+    const std::size_t dot = parameter.name.find('.');
+    const ParameterInfo& info = result.info(parameter.name.substr(0, dot));
+    if (dot == std::string::npos) {
+      result.set(info.name, parameter.estimate.value);
+    } else {
+      const std::size_t channel = parameter.name.back() == 'r' ? 0 : parameter.name.back() == 'g' ? 1 : 2;
+      result.flat()[static_cast<std::size_t>(info.offset) + channel] = parameter.estimate.value;
+    }
+  }
+  return result;
+}
+
+namespace {
+
+Json metrics_json(const std::vector<FitMetric>& metrics) {
+  Json json = Json::object();
+  for (const FitMetric& metric : metrics) json[metric.name] = metric.value;
+  return json;
+}
+
+}  // namespace
+
+Json Fit::json(const std::string& command, const std::string& table_sha256) const {
+  Json list = Json::array();
+  for (const FitParameter& p : parameters) {
+    list.push_back({{"name", p.name},
+                    {"value", p.estimate.value},
+                    {"stderr", p.estimate.standard_error},
+                    {"ci95", {p.estimate.ci_low, p.estimate.ci_high}},
+                    {"misfit_stderr", p.estimate.misfit_standard_error},
+                    {"lower", p.lower},
+                    {"upper", p.upper},
+                    {"at_bound", p.estimate.at_bound},
+                    {"identifiable", p.estimate.identifiable},
+                    {"free", p.free}});
+  }
+  Json mapping_list = Json::array();
+  for (const AxisMapping& m : mappings) {
+    mapping_list.push_back({{"parameter", m.parameter}, {"axis", m.axis}, {"scale", m.scale}, {"power", m.power}});
+  }
+  std::vector<std::string_view> weights;
+  for (const WeightFactor factor : options.weights) weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
+  Json document{{"model", model},
+                {"params", list},
+                {"metrics", metrics_json(metrics)},
+                {"holdout", metrics_json(holdout)},
+                {"correlation", solution.correlation},
+                {"identifiable", solution.identifiable},
+                {"remarks", solution.remarks},
+                {"solver",
+                 {{"converged", solution.converged}, {"iterations", solution.iterations},
+                  {"starts", starts_tried}, {"message", solution.termination},
+                  {"metric", quantity_names[static_cast<std::size_t>(options.quantity)]}, {"weights", weights},
+                  {"loss", loss_names[static_cast<std::size_t>(options.loss)]}}},
+                {"provenance",
+                 {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", options.seed},
+                  {"table_sha256", table_sha256}}}};
+  if (!mappings.empty()) document["map"] = mapping_list;
+  return document;
+}
+
+Fit Fit::from_json(const Json& json, const std::string& place) {
+  const JsonReader reader(json, place);
+  Fit result;
+  result.model = reader.at("model").text();
+  try {
+    find_model(result.model);
+    for (const JsonReader& element : reader.at("params").elements()) {
+      FitParameter parameter{.name = element.at("name").text(),
+                             .lower = element.at("lower").number(),
+                             .upper = element.at("upper").number(),
+                             .free = element.at("free").boolean()};
+      parameter.estimate.value = element.at("value").number();
+      parameter.estimate.standard_error = element.at("stderr").number();
+      const std::vector<double> interval = element.at("ci95").numbers();
+      if (interval.size() != 2) throw element.at("ci95").error("expected two numbers", "write [low, high]");
+      parameter.estimate.ci_low = interval[0];
+      parameter.estimate.ci_high = interval[1];
+      parameter.estimate.at_bound = element.at("at_bound").boolean();
+      result.parameters.push_back(parameter);
+    }
+    if (reader.has("map")) {
+      for (const JsonReader& m : reader.at("map").elements()) {
+        result.mappings.push_back({m.at("parameter").text(), m.at("axis").text(), m.at("scale").number(), m.at("power").number()});
+      }
+    }
+    result.values();
+  } catch (const Error& error) {
+    if (error.code() == ExitCode::usage) throw error.inside(ExitCode::invalid_input, place);
+    throw;
+  }
+  return result;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,278 @@
+#include "fit/least_squares.h"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <exception>
+
+namespace lobefit {
+
+namespace {
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+constexpr std::size_t residuals_per_block = 1024;
+
+/// Residuals and Jacobian at Ceres' current point, computed once for all blocks.
+class Cache : public ceres::EvaluationCallback {
+ public:
+  Cache(const LeastSquaresProblem& problem, const double* x, Monitor& monitor)
+      : problem_(problem), x_(x), monitor_(monitor), residuals(problem.residual_count),
+        jacobian(problem.residual_count * problem.names.size()) {}
+
+  void PrepareForEvaluation(bool jacobians, bool new_point) override {
+    if (new_point) has_residuals_ = has_jacobian_ = false;
+    if (has_residuals_ && (has_jacobian_ || !jacobians)) return;
+    try {
+      monitor_.check();
+      valid = problem_.evaluate({x_, problem_.names.size()}, residuals, jacobians ? jacobian.data() : nullptr);
+    } catch (...) {
+      // Ceres is not written to be thrown through: stop it, and throw again outside.
+      failure = std::current_exception();
+      valid = false;
+    }
+    has_residuals_ = true;
+    has_jacobian_ = jacobians;
+  }
+
+ private:
+  const LeastSquaresProblem& problem_;
+  const double* x_;
+  Monitor& monitor_;
+  bool has_residuals_ = false, has_jacobian_ = false;
+
+ public:
+  std::vector<double> residuals, jacobian;
+  bool valid = true;
+  std::exception_ptr failure;
+};
+
+/// Rows [first, first + count) of the cache.
+class Block : public ceres::CostFunction {
+ public:
+  Block(const Cache& cache, std::size_t first, std::size_t count, std::size_t variables)
+      : cache_(cache), first_(first), count_(count), variables_(variables) {
+    set_num_residuals(static_cast<int>(count));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(variables));
+  }
+
+  bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+    if (!cache_.valid) return false;
+    std::copy_n(cache_.residuals.data() + first_, count_, residuals);
+    if (jacobians && jacobians[0]) {
+      std::copy_n(cache_.jacobian.data() + first_ * variables_, count_ * variables_, jacobians[0]);
+    }
+    return true;
+  }
+
+ private:
+  const Cache& cache_;
+  std::size_t first_, count_, variables_;
+};
+
+/// Stops the solver when the user asks, or when an evaluation has failed.
+class StopOnFailure : public ceres::IterationCallback {
+ public:
+  explicit StopOnFailure(const Cache& cache) : cache_(cache) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return cache_.failure ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const Cache& cache_;
+};
+
+/// Names the direction v of variable space: "0.8 a - 0.6 b".
+std::string direction_text(const Eigen::VectorXd& v, const std::vector<std::string>& names) {
+  std::string text;
+  for (Eigen::Index i = 0; i < v.size(); ++i) {
+    if (std::abs(v[i]) < 0.05) continue;
+    text += fmt::format("{}{:.2f} {}", text.empty() ? (v[i] < 0 ? "-" : "") : (v[i] < 0 ? " - " : " + "),
+                        std::abs(v[i]), names[static_cast<std::size_t>(i)]);
+  }
+  return text;
+}
+
+/// Fills in errors, intervals, correlation and identifiability at the solution.
+void analyse(const LeastSquaresProblem& problem, std::span<const double> x, LeastSquaresSolution& solution) {
+  const auto n = static_cast<Eigen::Index>(problem.residual_count);
+  const auto p = static_cast<Eigen::Index>(x.size());
+  std::vector<double> residuals(problem.residual_count), jacobian(problem.residual_count * x.size());
+  problem.evaluate(x, residuals, jacobian.data());
+  const Eigen::Map<const RowMatrix> j(jacobian.data(), n, p);
+  const Eigen::Map<const Eigen::VectorXd> r(residuals.data(), n);
+  solution.sum_of_squares = r.squaredNorm();
+
+  // Variables that the errors can be computed for: not at a bound, and with an effect. A variable without effect is
+  // one whose column vanishes against the largest, each scaled by its own range.
+  std::vector<double> effect(x.size());
+  double largest = 0.0;
+  for (Eigen::Index k = 0; k < p; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double range = problem.upper[i] - problem.lower[i];
+    effect[i] = j.col(k).norm() * (std::isfinite(range) ? range : std::max(1.0, std::abs(x[i])));
+    largest = std::max(largest, effect[i]);
+  }
+  std::vector<Eigen::Index> active;
+  std::vector<std::string> active_names;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    FittedVariable& variable = solution.variables[i];
+    const double range = problem.upper[i] - problem.lower[i];
+    const double near = std::isfinite(range) ? 1e-7 * range : 0.0;
+    variable.at_bound = x[i] - problem.lower[i] <= near || problem.upper[i] - x[i] <= near;
+    variable.identifiable = effect[i] > 1e-10 * largest;
+    if (!variable.identifiable) {
+      solution.remarks.push_back(problem.names[i] + " has no effect on these data: its value is the start value");
+    } else if (variable.at_bound) {
+      solution.remarks.push_back(fmt::format("{} is at its bound {:g}", problem.names[i], x[i]));
+    } else {
+      active.push_back(static_cast<Eigen::Index>(i));
+      active_names.push_back(problem.names[i]);
+    }
+  }
+  const auto m = static_cast<Eigen::Index>(active.size());
+  solution.correlation.assign(x.size(), std::vector<double>(x.size(), 0.0));
+  if (m == 0) {
+    solution.identifiable = std::all_of(solution.variables.begin(), solution.variables.end(),
+                                        [](const FittedVariable& v) { return v.identifiable; });
+    return;
+  }
+
+  Eigen::MatrixXd ja(n, m);
+  Eigen::VectorXd scale(m);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    scale[k] = j.col(active[static_cast<std::size_t>(k)]).norm();
+    ja.col(k) = j.col(active[static_cast<std::size_t>(k)]) / scale[k];
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(ja.transpose() * ja);
+  // Eigenvalues of the scaled normal matrix are squared singular values.
+  const double threshold = 1e-12;
+  for (Eigen::Index k = 0; k < m; ++k) {
+    if (eigen.eigenvalues()[k] > threshold) continue;
+    solution.identifiable = false;
+    solution.remarks.push_back("the data don't decide " +
+                               direction_text(eigen.eigenvectors().col(k).cwiseQuotient(scale).normalized(), active_names));
+    for (Eigen::Index l = 0; l < m; ++l) {
+      if (std::abs(eigen.eigenvectors()(l, k)) > 0.05) {
+        solution.variables[static_cast<std::size_t>(active[static_cast<std::size_t>(l)])].identifiable = false;
+      }
+    }
+  }
+  const Eigen::VectorXd inverse_values =
+      eigen.eigenvalues().unaryExpr([&](double v) { return v > threshold ? 1.0 / v : 0.0; });
+  const Eigen::MatrixXd inverse_normal =
+      scale.cwiseInverse().asDiagonal() *
+      (eigen.eigenvectors() * inverse_values.asDiagonal() * eigen.eigenvectors().transpose()).eval() *
+      scale.cwiseInverse().asDiagonal();
+  const double variance = n > p ? solution.sum_of_squares / static_cast<double>(n - p) : 0.0;
+
+  Eigen::MatrixXd data_covariance = Eigen::MatrixXd::Zero(m, m);
+  if (problem.gradient_covariance) {
+    const std::vector<double> flat = problem.gradient_covariance(x, jacobian);
+    const Eigen::Map<const RowMatrix> full(flat.data(), p, p);
+    const Eigen::MatrixXd gradient_covariance = full(active, active);
+    // How the optimum moves with the data is the inverse of the whole Hessian JᵀJ + Σ r ∇²r: where a model can't meet
+    // the data, the second term counts. It comes from central differences of the gradient.
+    Eigen::MatrixXd hessian(m, m);
+    std::vector<double> moved(x.begin(), x.end()), r2(residuals.size()), j2(jacobian.size());
+    const auto gradient = [&](std::size_t i, double value) {
+      moved[i] = value;
+      problem.evaluate(moved, r2, j2.data());
+      moved[i] = x[i];
+      const Eigen::Map<const RowMatrix> jacobian2(j2.data(), n, p);
+      const Eigen::Map<const Eigen::VectorXd> residuals2(r2.data(), n);
+      return Eigen::VectorXd(jacobian2.transpose() * residuals2);
+    };
+    for (Eigen::Index k = 0; k < m; ++k) {
+      const auto i = static_cast<std::size_t>(active[static_cast<std::size_t>(k)]);
+      const double room = std::min(problem.upper[i] - x[i], x[i] - problem.lower[i]);
+      const double step = std::min(1e-5 * std::max(1e-2, std::abs(x[i])), 0.5 * room);
+      const Eigen::VectorXd column = (gradient(i, x[i] + step) - gradient(i, x[i] - step)) / (2.0 * step);
+      hessian.col(k) = column(active);
+    }
+    const Eigen::MatrixXd symmetric = scale.cwiseInverse().asDiagonal() * (0.5 * (hessian + hessian.transpose())).eval() *
+                                      scale.cwiseInverse().asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> curvature(symmetric);
+    const Eigen::VectorXd inverse_curvature =
+        curvature.eigenvalues().unaryExpr([&](double v) { return v > threshold ? 1.0 / v : 0.0; });
+    const Eigen::MatrixXd inverse_hessian =
+        scale.cwiseInverse().asDiagonal() *
+        (curvature.eigenvectors() * inverse_curvature.asDiagonal() * curvature.eigenvectors().transpose()).eval() *
+        scale.cwiseInverse().asDiagonal();
+    data_covariance = inverse_hessian * gradient_covariance * inverse_hessian;
+  }
+  const double quantile =
+      problem.degrees_of_freedom > 0
+          ? boost::math::quantile(boost::math::students_t(problem.degrees_of_freedom), 0.975)
+          : boost::math::quantile(boost::math::normal(), 0.975);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    FittedVariable& variable = solution.variables[static_cast<std::size_t>(active[static_cast<std::size_t>(k)])];
+    variable.misfit_standard_error = std::sqrt(variance * inverse_normal(k, k));
+    variable.standard_error = std::sqrt(std::max(0.0, data_covariance(k, k)));
+    variable.ci_low = variable.value - quantile * variable.standard_error;
+    variable.ci_high = variable.value + quantile * variable.standard_error;
+    for (Eigen::Index l = 0; l < m; ++l) {
+      const double product = inverse_normal(k, k) * inverse_normal(l, l);
+      solution.correlation[static_cast<std::size_t>(active[static_cast<std::size_t>(k)])]
+                          [static_cast<std::size_t>(active[static_cast<std::size_t>(l)])] =
+          product > 0.0 ? inverse_normal(k, l) / std::sqrt(product) : 0.0;
+    }
+  }
+  for (const FittedVariable& variable : solution.variables) {
+    solution.identifiable = solution.identifiable && variable.identifiable;
+  }
+}
+
+}  // namespace
+
+LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor) {
+  const std::size_t variables = problem.names.size();
+  LeastSquaresSolution solution;
+  solution.variables.resize(variables);
+  std::vector<double> x = problem.start;
+  if (variables > 0) {
+    Cache cache(problem, x.data(), monitor);
+    ceres::Problem::Options problem_options;
+    problem_options.evaluation_callback = &cache;
+    ceres::Problem ceres_problem(problem_options);
+    for (std::size_t first = 0; first < problem.residual_count; first += residuals_per_block) {
+      const std::size_t count = std::min(residuals_per_block, problem.residual_count - first);
+      ceres_problem.AddResidualBlock(new Block(cache, first, count, variables), nullptr, x.data());
+    }
+    for (std::size_t i = 0; i < variables; ++i) {
+      if (std::isfinite(problem.lower[i])) ceres_problem.SetParameterLowerBound(x.data(), static_cast<int>(i), problem.lower[i]);
+      if (std::isfinite(problem.upper[i])) ceres_problem.SetParameterUpperBound(x.data(), static_cast<int>(i), problem.upper[i]);
+    }
+    ceres::Solver::Options options;
+    // QR keeps the digits that ill-conditioned problems need; large ones are well overdetermined and can spare them.
+    options.linear_solver_type =
+        problem.residual_count * variables < 4'000'000 ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
+    options.max_num_iterations = problem.maximum_iterations;
+    options.function_tolerance = 1e-15;
+    options.parameter_tolerance = 1e-13;
+    options.gradient_tolerance = 1e-15;
+    options.num_threads = 1;
+    options.logging_type = ceres::SILENT;
+    StopOnFailure stop(cache);
+    options.callbacks.push_back(&stop);
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &ceres_problem, &summary);
+    if (cache.failure) std::rethrow_exception(cache.failure);
+    solution.converged = summary.termination_type == ceres::CONVERGENCE;
+    solution.iterations = summary.num_successful_steps + summary.num_unsuccessful_steps;
+    solution.termination = summary.message;
+  } else {
+    solution.converged = true;
+    solution.termination = "nothing was free";
+  }
+  for (std::size_t i = 0; i < variables; ++i) {
+    solution.variables[i].value = solution.variables[i].ci_low = solution.variables[i].ci_high = x[i];
+  }
+  analyse(problem, x, solution);
+  return solution;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,332 @@
+#include "fit/recipe.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+
+#include "reference/json_reader.h"
+#include "reference/output_file.h"
+
+namespace lobefit {
+
+namespace {
+
+std::vector<double> number_or_numbers(const JsonReader& reader) {
+  return reader.value().is_array() ? reader.numbers() : std::vector{reader.number()};
+}
+
+/// Sets parameters from a JSON object; a wrong name or value is reported with its path.
+void set_parameters(ParameterValues& values, const JsonReader& reader) {
+  for (const auto& [name, member] : reader.members()) {
+    try {
+      if (member.value().is_string()) {
+        values.set_text(name, member.text());
+      } else {
+        values.set(name, number_or_numbers(member));
+      }
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::usage) throw;
+      throw error.inside(ExitCode::invalid_input, member.path());
+    }
+  }
+}
+
+/// Runs `read`, whose complaints about usage become complaints about the place in the file.
+template <class Read>
+auto in_file(const JsonReader& reader, Read&& read) {
+  try {
+    return read();
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::usage) throw;
+    throw error.inside(ExitCode::invalid_input, reader.path());
+  }
+}
+
+Rival read_rival(const JsonReader& reader) {
+  reader.allow({"label", "model", "set", "map", "free_per_row"});
+  Rival rival;
+  rival.model = reader.at("model").text();
+  rival.label = reader.has("label") ? reader.at("label").text() : rival.model;
+  ParameterValues values = in_file(reader.at("model"), [&] { return find_model(rival.model).defaults(); });
+  if (reader.has("set")) {
+    set_parameters(values, reader.at("set"));
+    for (const auto& [name, member] : reader.at("set").members()) rival.set.emplace_back(name, number_or_numbers(member));
+  }
+  if (reader.has("map")) {
+    for (const JsonReader& text : reader.at("map").elements()) {
+      rival.mappings.push_back(in_file(text, [&] { return AxisMapping::parse(text.text()); }));
+      in_file(text, [&] { return values.info(rival.mappings.back().parameter); });
+    }
+  }
+  if (reader.has("free_per_row")) {
+    for (const JsonReader& name : reader.at("free_per_row").elements()) {
+      in_file(name, [&] { return values.info(name.text()); });
+      rival.free_per_row.push_back(name.text());
+    }
+  }
+  return rival;
+}
+
+RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_values) {
+  reader.allow({"name", "views", "model", "reference", "grid", "metric", "weights", "free"});
+  RecipeRow row;
+  row.model = reader.has("model") ? reader.at("model").text() : recipe_values.owner();
+  const ParameterValues model_values =
+      reader.has("model") ? in_file(reader.at("model"), [&] { return find_model(row.model).defaults(); }) : recipe_values;
+  if (model_values.flat().size() != recipe_values.flat().size()) {
+    throw reader.at("model").error("'" + row.model + "' has other parameters than " + recipe_values.owner(),
+                                   "name a variant of the recipe's model");
+  }
+  row.name = reader.at("name").text();
+  row.views = reader.at("views").text();
+  const JsonReader reference = reader.at("reference");
+  reference.allow({"name", "set"});
+  row.reference = reference.at("name").text();
+  row.reference_values = in_file(reference.at("name"), [&] { return find_reference(row.reference).defaults(); });
+  if (reference.has("set")) set_parameters(row.reference_values, reference.at("set"));
+  const JsonReader grid = reader.at("grid");
+  if (grid.value().is_string()) {
+    row.grid_name = grid.text();
+    row.grid = in_file(grid, [&] { return Grid::named_or_file(row.grid_name); });
+  } else {
+    row.grid_name = row.name;
+    row.grid = Grid::from_json(grid.value(), grid.path());
+  }
+  row.quantity = in_file(reader.at("metric"), [&] { return parse_quantity(reader.at("metric").text()); });
+  row.weights = in_file(reader.at("weights"), [&] { return parse_weights(reader.at("weights").text()); });
+  for (const JsonReader& set : reader.at("free").elements()) {
+    std::vector<std::string> names;
+    for (const JsonReader& name : set.elements()) {
+      in_file(name, [&] { return model_values.info(name.text()); });
+      names.push_back(name.text());
+    }
+    row.free_sets.push_back(names);
+  }
+  return row;
+}
+
+/// rms over the table of a rival, refitted per parameter row where the recipe says so.
+double score(const Rival& rival, const Table& table, Quantity quantity, const std::vector<double>& weights,
+             const RecipeRow& row, Monitor& monitor) {
+  const Model& model = find_model(rival.model);
+  ParameterValues values = with_table_parameters(model.defaults(), table);
+  for (const auto& [name, components] : rival.set) values.set(name, components);
+  if (rival.free_per_row.empty()) {
+    return rms_difference(table, TableModel(model, values, table, rival.mappings).render().values, quantity, weights);
+  }
+  double squares = 0.0;
+  const std::size_t per_row = table.entries() / table.parameter_rows();
+  for (std::size_t r = 0; r < table.parameter_rows(); ++r) {
+    const Table slice = table.row_slice(r);
+    FitOptions options{.free = rival.free_per_row, .quantity = quantity, .weights = row.weights};
+    const Fit fitted = fit(model, values, slice, options, monitor);
+    const auto first = weights.begin() + static_cast<std::ptrdiff_t>(r * per_row);
+    squares += std::accumulate(first, first + static_cast<std::ptrdiff_t>(per_row), 0.0) * fitted.solution.sum_of_squares;
+  }
+  return std::sqrt(squares);
+}
+
+std::string constants_text(const RecipeResultRow& row, const Recipe& recipe) {
+  std::string text;
+  for (const FitParameter& p : row.fit.parameters) {
+    const bool published = std::any_of(recipe.published.begin(), recipe.published.end(),
+                                       [&](const auto& constant) { return constant.first == p.name; });
+    if (p.free && published) text += fmt::format("{}{} = {:.4f}", text.empty() ? "" : ", ", p.name, p.estimate.value);
+  }
+  return text;
+}
+
+/// Largest distance of a refitted constant from its published value.
+double distance(const RecipeResultRow& row, const Recipe& recipe) {
+  double worst = 0.0;
+  for (const auto& [name, published] : recipe.published) {
+    for (const FitParameter& p : row.fit.parameters) {
+      if (p.free && p.name == name) worst = std::max(worst, std::abs(p.estimate.value - published));
+    }
+  }
+  return worst;
+}
+
+std::string conclude(const Recipe& recipe, const std::vector<RecipeResultRow>& rows) {
+  std::string published, reproducing, others;
+  for (const auto& [name, value] : recipe.published) published += fmt::format("{}{} = {:g}", published.empty() ? "" : ", ", name, value);
+  for (const RecipeResultRow& row : rows) {
+    // Told once per row, by its first set of constants and its exact table.
+    if (row.method != "exact" || row.free != row.row->free_sets.front()) continue;
+    const double off = distance(row, recipe);
+    if (off <= recipe.tolerance) {
+      reproducing += fmt::format("{}{} ({})", reproducing.empty() ? "" : " and ", row.row->name, constants_text(row, recipe));
+    } else {
+      others += fmt::format("{}{} ({}; off by {:.4f})", others.empty() ? "" : ", ", row.row->name, constants_text(row, recipe), off);
+    }
+  }
+  if (reproducing.empty()) {
+    return fmt::format("No row reproduces the published {} within {:g}: {}.", published, recipe.tolerance, others);
+  }
+  return fmt::format("The published {} are reproduced within {:g} by {}; not by {}.", published, recipe.tolerance,
+                     reproducing, others.empty() ? "any other row" : others);
+}
+
+}  // namespace
+
+Recipe Recipe::read(const std::filesystem::path& path) {
+  const Json json = parse_json(read_file(path), path.string());
+  const JsonReader reader(json, path.string());
+  reader.allow({"recipe", "title", "description", "model", "fixed", "published", "axes", "samples", "facets",
+                "tolerance", "rivals", "rows"});
+  Recipe recipe;
+  // Inner readers know their path in the document; the file's name is added here, once.
+  try {
+    recipe.name = reader.at("recipe").text();
+    recipe.title = reader.at("title").text();
+    recipe.description = reader.at("description").text();
+    recipe.model = reader.at("model").text();
+    recipe.fixed = in_file(reader.at("model"), [&] { return find_model(recipe.model).defaults(); });
+    if (reader.has("fixed")) set_parameters(recipe.fixed, reader.at("fixed"));
+    for (const auto& [name, member] : reader.at("published").members()) {
+      in_file(member, [&] { return recipe.fixed.info(name); });
+      recipe.published.emplace_back(name, member.number());
+    }
+    for (const auto& [name, member] : reader.at("axes").members()) {
+      recipe.parameter_axes.push_back({name, "", member.numbers(), false});
+    }
+    if (reader.has("samples")) {
+      const double samples = reader.at("samples").number();
+      if (!(samples >= replicate_count && samples <= static_cast<double>(most_samples))) {
+        throw reader.at("samples").error("out of range", fmt::format("choose from {} to {}", replicate_count, most_samples));
+      }
+      recipe.samples = static_cast<std::uint64_t>(samples);
+    }
+    if (reader.has("facets")) {
+      const std::string facets = reader.at("facets").text();
+      if (facets != "shared" && facets != "independent") {
+        throw reader.at("facets").error("unknown choice '" + facets + "'", "choose shared or independent");
+      }
+      recipe.shared_facets = facets == "shared";
+    }
+    recipe.tolerance = reader.at("tolerance").number();
+    if (reader.has("rivals")) {
+      for (const JsonReader& rival : reader.at("rivals").elements()) recipe.rivals.push_back(read_rival(rival));
+    }
+    for (const JsonReader& row : reader.at("rows").elements()) recipe.rows.push_back(read_row(row, recipe.fixed));
+    if (recipe.rows.empty()) throw reader.at("rows").error("the list is empty", "give at least one row");
+    for (std::size_t i = 0; i < recipe.rows.size(); ++i) {
+      const JsonReader row = reader.at("rows").elements()[i];
+      if (recipe.rows[i].free_sets.empty()) throw row.at("free").error("the list is empty", "name the parameters to refit");
+      for (const Axis& axis : recipe.parameter_axes) {
+        in_file(reader.at("axes").at(axis.name), [&] {
+          for (const double value : axis.values) ParameterValues(recipe.rows[i].reference_values).set(axis.name, value);
+          return 0;
+        });
+      }
+    }
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (message.find(path.string()) != std::string::npos) throw;
+    throw error.inside(error.code(), path.string());
+  }
+  return recipe;
+}
+
+RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monitor) {
+  RecipeResult result;
+  for (const RecipeRow& row : recipe.rows) {
+    for (const char* method : {"monte_carlo", "exact"}) {
+      const auto same = [&](const RecipeTable& known) {
+        return known.method == method && known.row->reference == row.reference &&
+               std::ranges::equal(known.row->reference_values.flat(), row.reference_values.flat()) &&
+               known.row->grid.theta_i.values == row.grid.theta_i.values &&
+               known.row->grid.theta_o.values == row.grid.theta_o.values &&
+               known.row->grid.phi.values == row.grid.phi.values;
+      };
+      if (std::none_of(result.tables.begin(), result.tables.end(), same)) {
+        const RenderOptions options{.sampling = {.samples = recipe.samples, .seed = seed},
+                                    .exact = std::string_view(method) == "exact",
+                                    .shared_facets = recipe.shared_facets};
+        result.tables.push_back({row.name + "." + method, &row, method,
+                                 render(find_reference(row.reference), row.reference_values, recipe.parameter_axes,
+                                        row.grid, options, monitor)});
+      }
+      const Model& model = find_model(row.model);
+      const Table& table = std::find_if(result.tables.begin(), result.tables.end(), same)->table;
+      const std::vector<double> weights = entry_weights(table, row.weights, row.quantity);
+
+      ParameterValues published = with_table_parameters(recipe.fixed, table);
+      for (const auto& [name, value] : recipe.published) published.set(name, value);
+      const double rms_published =
+          rms_difference(table, TableModel(model, published, table).render().values, row.quantity, weights);
+      std::vector<RivalScore> rivals;
+      for (const Rival& rival : recipe.rivals) {
+        rivals.push_back({rival.label, score(rival, table, row.quantity, weights, row, monitor)});
+      }
+      for (const std::vector<std::string>& free : row.free_sets) {
+        const FitOptions options{.free = free, .quantity = row.quantity, .weights = row.weights, .seed = seed};
+        RecipeResultRow line{.row = &row, .method = method, .free = free,
+                             .fit = fit(model, published, table, options, monitor),
+                             .rms_published = rms_published, .rivals = rivals};
+        line.rms_refit = std::sqrt(line.fit.solution.sum_of_squares);
+        result.rows.push_back(std::move(line));
+      }
+    }
+  }
+  result.conclusion = conclude(recipe, result.rows);
+  return result;
+}
+
+Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::uint64_t seed) const {
+  Json lines = Json::array();
+  for (const RecipeResultRow& line : rows) {
+    const RecipeRow& row = *line.row;
+    Json reference{{"name", row.reference}};
+    for (const ParameterInfo& info : row.reference_values.list()) {
+      if (!info.choices.empty()) reference[std::string(info.name)] = std::string(row.reference_values.choice(info.name));
+    }
+    Json axes = Json::object();
+    for (const Axis& axis : recipe.parameter_axes) axes[axis.name] = axis.values;
+    std::vector<std::string_view> weights;
+    for (const WeightFactor factor : row.weights) weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
+    Json parameters = Json::object(), fixed = Json::object();
+    for (const FitParameter& p : line.fit.parameters) {
+      if (!p.free) {
+        fixed[p.name] = p.estimate.value;
+        continue;
+      }
+      parameters[p.name] = {{"value", p.estimate.value},
+                            {"stderr", p.estimate.standard_error},
+                            {"ci95", {p.estimate.ci_low, p.estimate.ci_high}},
+                            {"misfit_stderr", p.estimate.misfit_standard_error},
+                            {"at_bound", p.estimate.at_bound},
+                            {"identifiable", p.estimate.identifiable}};
+    }
+    Json rms{{"published", line.rms_published}, {"refit", line.rms_refit}};
+    for (const RivalScore& rival : line.rivals) rms[rival.label] = rival.rms;
+    lines.push_back({{"name", row.name},
+                     {"model", row.model},
+                     {"reference", reference},
+                     {"domain",
+                      {{"views", row.views}, {"grid", row.grid_name}, {"axes", axes},
+                       {"theta_i", row.grid.theta_i.values}, {"theta_o", row.grid.theta_o.values},
+                       {"phi", row.grid.phi.values},
+                       {"metric", quantity_names[static_cast<std::size_t>(row.quantity)]}, {"weights", weights}}},
+                     {"method", line.method},
+                     {"free", line.free},
+                     {"fixed", fixed},
+                     {"params", parameters},
+                     {"rms", rms},
+                     {"identifiable", line.fit.solution.identifiable},
+                     {"converged", line.fit.solution.converged},
+                     {"remarks", line.fit.solution.remarks}});
+  }
+  Json published = Json::object();
+  for (const auto& [name, value] : recipe.published) published[name] = value;
+  return {{"recipe", recipe.name},
+          {"title", recipe.title},
+          {"published", published},
+          {"rows", lines},
+          {"conclusion", conclusion},
+          {"provenance", {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", seed}, {"samples", recipe.samples}}}};
+}
+
+}  // namespace lobefit

@@ -1,0 +1,90 @@
+// Recipes: a refit from reference to result, as data.
+//
+// A recipe names a closed form with published constants, and rows. A row is a reference over a domain, and the sets of
+// parameters to free on it. Every row is run on a Monte Carlo table and on an exact one; rivals are scored on the same
+// tables. data/recipes/proxima.json is the worked example, data/schemas/recipe.json the schema.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fit/fit.h"
+#include "reference/render.h"
+
+namespace lobefit {
+
+/// Another model scored on a row's table: as it is, or with one set of its parameters refitted per parameter row.
+struct Rival {
+  std::string label;
+  std::string model;
+  std::vector<std::pair<std::string, std::vector<double>>> set;
+  std::vector<AxisMapping> mappings;
+  std::vector<std::string> free_per_row;
+};
+
+struct RecipeRow {
+  std::string name;
+  std::string views;  // "all" or "normal_slice"
+  std::string model;  // the recipe's, or a variant of it with the same parameters
+  std::string reference;
+  ParameterValues reference_values;
+  std::string grid_name;  // as the recipe gives it, for the record
+  Grid grid;
+  Quantity quantity = Quantity::cosine;
+  std::vector<WeightFactor> weights;
+  std::vector<std::vector<std::string>> free_sets;
+};
+
+struct Recipe {
+  std::string name, title, description;
+  std::string model;
+  ParameterValues fixed;                                   // of the model, before anything is freed
+  std::vector<std::pair<std::string, double>> published;   // constants to be checked
+  std::vector<Axis> parameter_axes;
+  std::uint64_t samples = 1u << 14;
+  bool shared_facets = true;
+  double tolerance = 0.0;  // a row reproduces the published constants if it meets them this closely
+  std::vector<Rival> rivals;
+  std::vector<RecipeRow> rows;
+
+  /// Throws Error(invalid_input) with the JSON path.
+  static Recipe read(const std::filesystem::path& path);
+};
+
+struct RivalScore {
+  std::string label;
+  double rms;
+};
+
+/// One line of the result: a row, a method and a set of free parameters.
+struct RecipeResultRow {
+  const RecipeRow* row;
+  std::string method;  // "monte_carlo" or "exact"
+  std::vector<std::string> free;
+  Fit fit;
+  double rms_published = 0.0, rms_refit = 0.0;
+  std::vector<RivalScore> rivals;
+};
+
+/// A table that rows with the same reference and grid share.
+struct RecipeTable {
+  std::string name;  // file stem
+  const RecipeRow* row;
+  std::string method;
+  Table table;
+};
+
+struct RecipeResult {
+  std::vector<RecipeTable> tables;
+  std::vector<RecipeResultRow> rows;
+  std::string conclusion;
+
+  Json json(const Recipe& recipe, const std::string& command, std::uint64_t seed) const;
+};
+
+/// Renders, fits and scores every row. The recipe must outlive the result.
+RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monitor);
+
+}  // namespace lobefit

@@ -1,0 +1,30 @@
+// All models by name, in double precision.
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "models/model.h"
+
+namespace lobefit {
+
+/// A registered model: the formula's truth. Values are BRDFs in 1/sr, without cosine.
+struct Model {
+  const ModelInfo* info;
+  std::vector<ParameterInfo> parameters;
+  /// Value at one pair of unit directions; `flat` are the parameters in the order of `parameters`.
+  Rgb (*evaluate)(std::span<const double> flat, const Direction& wi, const Direction& wo);
+  /// The same over n pairs.
+  void (*evaluate_all)(std::span<const double> flat, std::span<const Direction> wi, std::span<const Direction> wo,
+                       std::span<Rgb> values);
+
+  ParameterValues defaults() const { return ParameterValues(parameters, std::string(info->name)); }
+};
+
+/// Every registered model, in the order of list.def.
+std::span<const Model> models();
+/// Throws Error(usage) with the nearest name.
+const Model& find_model(std::string_view name);
+
+}  // namespace lobefit

@@ -1,0 +1,179 @@
+#include "reference/microfacet_diffuse.h"
+
+#include <algorithm>
+#include <boost/math/quadrature/tanh_sinh.hpp>
+#include <vector>
+
+#include "models/instruction_sets.h"
+#include "reference/visible_normals.h"
+
+namespace lobefit {
+
+namespace {
+
+/// ∫ (A + B cos φ)(C + E cos(φ - Δ)) dφ over [from, to].
+struct AzimuthIntegral {
+  double a, b, c, e, delta;
+
+  double antiderivative(double phi) const {
+    return (a * c + 0.5 * b * e * std::cos(delta)) * phi + a * e * std::sin(phi - delta) + b * c * std::sin(phi) +
+           0.25 * b * e * std::sin(2.0 * phi - delta);
+  }
+  double over(double from, double to) const { return to > from ? antiderivative(to) - antiderivative(from) : 0.0; }
+};
+
+/// Half width of the arc of facet azimuths that turn away from a direction at facet slope t: cos = μ/(t sin θ).
+double hidden_half_width(double t, double cosine, double sine) {
+  const double edge = t * sine;
+  return edge > cosine ? std::acos(cosine / edge) : 0.0;
+}
+
+/// The azimuthal part of K at facet slope t, over 2π: mean of (m·a)⁺ (m·b)⁺ / cos²θ_m.
+double azimuth_mean(double t, const Direction& a, const Direction& b, double sine_a, double sine_b, double delta) {
+  const AzimuthIntegral integral{a.z, t * sine_a, b.z, t * sine_b, delta};
+  // Facets turn away from a around azimuth π, from b around Δ + π. What is left is one arc, or two.
+  const double hidden_a = hidden_half_width(t, a.z, sine_a);
+  const double hidden_b = hidden_half_width(t, b.z, sine_b);
+  double sum = 0.0;
+  if (hidden_a + hidden_b < delta) {
+    sum = integral.over(hidden_a - pi, delta - pi - hidden_b) + integral.over(delta - pi + hidden_b, pi - hidden_a);
+  } else {
+    const double from = std::max(hidden_a, delta + hidden_b);
+    const double to = 2.0 * pi + std::min(-hidden_a, delta - hidden_b);
+    sum = integral.over(from - pi, to - pi);
+  }
+  return sum / (2.0 * pi);
+}
+
+constexpr std::uint32_t block = 256;  // facets summed in float before the sum moves to double
+
+/// sums[j] += Σ over facets of (m · wi_j)⁺. Lanes are directions; the order of facets is the order of additions.
+LOBEFIT_CLONES [[gnu::noinline]] void add_visible_cosines(const float* __restrict m, std::uint32_t facets,
+                                                          const float* __restrict x, const float* __restrict y,
+                                                          const float* __restrict z, std::size_t n,
+                                                          float* __restrict sums) {
+  // Sixteen directions stay in registers while all facets pass.
+  std::size_t j = 0;
+  for (; j + 16 <= n; j += 16) {
+    float sum[16] = {};
+    for (std::uint32_t k = 0; k < facets; ++k) {
+      const float mx = m[3 * k], my = m[3 * k + 1], mz = m[3 * k + 2];
+      for (std::size_t lane = 0; lane < 16; ++lane) {
+        const float cosine = mx * x[j + lane] + my * y[j + lane] + mz * z[j + lane];
+        sum[lane] += cosine > 0.0f ? cosine : 0.0f;
+      }
+    }
+    for (std::size_t lane = 0; lane < 16; ++lane) sums[j + lane] += sum[lane];
+  }
+}
+
+}  // namespace
+
+double shared_visibility(Distribution distribution, double alpha, const Direction& a, const Direction& b) {
+  const double sine_a = std::hypot(a.x, a.y), sine_b = std::hypot(b.x, b.y);
+  const double delta = std::abs(std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
+
+  // With t = α tan x the measure P22 t dt dφ of either distribution is smooth and bounded up to x = π/2:
+  // K = ∫ 2π α²P22 tan x sec²x cosθ_m azimuth_mean dx.
+  const auto integrand = [&](double x) {
+    const double tau = std::tan(x);
+    const double t = alpha * tau;
+    const double measure = distribution == Distribution::ggx
+                               ? 2.0 * std::sin(x) * std::cos(x)
+                               : 2.0 * tau * (1.0 + tau * tau) * std::exp(-tau * tau);
+    if (measure == 0.0) return 0.0;
+    return measure / std::sqrt(1.0 + t * t) * azimuth_mean(t, a, b, sine_a, sine_b, delta);
+  };
+
+  // The visible arcs change their shape where a facet can turn away from a, from b, or from both at once; the
+  // integrand has a kink there.
+  std::vector<double> knots{0.0, pi / 2.0};
+  const auto add_knot = [&](double rise, double run) {
+    const double x = std::atan2(rise, alpha * run);
+    if (x > 0.0 && x < pi / 2.0) knots.push_back(x);
+  };
+  add_knot(a.z, sine_a);
+  add_knot(b.z, sine_b);
+  const Direction edge = cross(a, b);
+  add_knot(std::hypot(edge.x, edge.y), std::abs(edge.z));
+  std::sort(knots.begin(), knots.end());
+
+  static boost::math::quadrature::tanh_sinh<double> integrator(15);
+  double sum = 0.0;
+  for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+    if (knots[i + 1] - knots[i] > 1e-15) sum += integrator.integrate(integrand, knots[i], knots[i + 1], 1e-11);
+  }
+  return sum;
+}
+
+MicrofacetDiffuseSurface::MicrofacetDiffuseSurface(std::span<const double> flat) {
+  const auto p = unflatten<MicrofacetDiffuse, double>(flat);
+  distribution_ = static_cast<Distribution>(p.distribution);
+  masking_ = static_cast<Masking>(p.masking);
+  alpha_ = p.alpha;
+}
+
+double MicrofacetDiffuseSurface::exact(const Direction& wi, const Direction& wo) const {
+  const Direction seen = seen_from(wo);
+  // The mean over visible normals is E[(wi·m)⁺] = K(wi, w) G1(w)/(w·n).
+  const double visible_mean = shared_visibility(distribution_, alpha_, wi, seen) /
+                              (seen.z * (1.0 + smith_lambda(distribution_, alpha_, seen)));
+  return weight(wi, wo) * visible_mean;
+}
+
+Direction MicrofacetDiffuseSurface::seen_from(const Direction& wo) const {
+  return masking_ == Masking::area_mean ? Direction{0.0, 0.0, 1.0} : wo;
+}
+
+double MicrofacetDiffuseSurface::weight(const Direction& wi, const Direction& wo) const {
+  const double lambda_i = smith_lambda(distribution_, alpha_, wi);
+  const double lambda_o = smith_lambda(distribution_, alpha_, wo);
+  double g2_over_g1 = 1.0;  // G2/G1(wo): visible normals carry G1(wo) already
+  switch (masking_) {
+    case Masking::correlated: g2_over_g1 = (1.0 + lambda_o) / (1.0 + lambda_i + lambda_o); break;
+    case Masking::separable: g2_over_g1 = 1.0 / (1.0 + lambda_i); break;
+    case Masking::none: g2_over_g1 = 1.0 + lambda_o; break;
+    case Masking::view_only: break;
+    case Masking::area_mean: break;
+  }
+  return g2_over_g1 / (pi * wi.z);
+}
+
+void MicrofacetDiffuseSurface::sample_row(const Direction& wo, std::span<const Direction> wi, const SamplePoints& points,
+                                          std::uint32_t samples, std::span<double> values) const {
+  std::fill(values.begin(), values.end(), 0.0);
+  const Direction seen = seen_from(wo);
+  for (std::uint32_t k = 0; k < samples; ++k) {
+    const Direction m = sample_visible_normal(distribution_, alpha_, seen, points(k));
+    for (std::size_t j = 0; j < wi.size(); ++j) values[j] += max(dot(m, wi[j]), 0.0);
+  }
+  for (std::size_t j = 0; j < wi.size(); ++j) values[j] *= weight(wi[j], wo) / samples;
+}
+
+void MicrofacetDiffuseSurface::sample_row_fast(const Direction& wo, std::span<const Direction> wi,
+                                               const SamplePoints& points, std::uint32_t samples,
+                                               std::span<double> values) const {
+  std::fill(values.begin(), values.end(), 0.0);
+  const Direction seen = seen_from(wo);
+  const std::size_t padded = (wi.size() + 15) / 16 * 16;
+  std::vector<float> x(padded), y(padded), z(padded), sums(padded);
+  for (std::size_t j = 0; j < wi.size(); ++j) {
+    x[j] = static_cast<float>(wi[j].x), y[j] = static_cast<float>(wi[j].y), z[j] = static_cast<float>(wi[j].z);
+  }
+  std::array<float, 3 * block> facets;
+  for (std::uint32_t first = 0; first < samples; first += block) {
+    const std::uint32_t count = std::min(block, samples - first);
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const Direction m = sample_visible_normal(distribution_, alpha_, seen, points(first + k));
+      facets[3 * k] = static_cast<float>(m.x);
+      facets[3 * k + 1] = static_cast<float>(m.y);
+      facets[3 * k + 2] = static_cast<float>(m.z);
+    }
+    std::fill(sums.begin(), sums.end(), 0.0f);
+    add_visible_cosines(facets.data(), count, x.data(), y.data(), z.data(), padded, sums.data());
+    for (std::size_t j = 0; j < wi.size(); ++j) values[j] += sums[j];
+  }
+  for (std::size_t j = 0; j < wi.size(); ++j) values[j] *= weight(wi[j], wo) / samples;
+}
+
+}  // namespace lobefit

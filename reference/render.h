@@ -1,0 +1,30 @@
+// Tables from references and models.
+#pragma once
+
+#include <span>
+
+#include "models/registry.h"
+#include "reference/monitor.h"
+#include "reference/references.h"
+#include "reference/table.h"
+
+namespace lobefit {
+
+struct RenderOptions {
+  SamplingOptions sampling{.samples = 1u << 14};  // per entry
+  bool exact = false;
+  /// One facet set serves all lights of a line: fast, but their errors are correlated, so replicates are kept.
+  /// Otherwise every entry has its own facets.
+  bool shared_facets = true;
+};
+
+/// Renders `reference` with `values` over the grid and the parameter axes. The bits depend on the arguments alone, not
+/// on the number of threads. Throws Error(usage) if an axis is no parameter or leaves its range.
+Table render(const Reference& reference, const ParameterValues& values, std::vector<Axis> parameter_axes,
+             const Grid& grid, const RenderOptions& options, Monitor& monitor);
+
+/// The same for a model: exact values.
+Table render(const Model& model, const ParameterValues& values, std::vector<Axis> parameter_axes, const Grid& grid,
+             Monitor& monitor);
+
+}  // namespace lobefit

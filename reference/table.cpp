@@ -1,0 +1,154 @@
+#include "reference/table.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/error.h"
+#include "models/parameter.h"
+#include "reference/json_reader.h"
+#include "reference/output_file.h"
+
+namespace lobefit {
+
+namespace {
+
+Axis steps(const std::string& name, int count, double step) {
+  Axis axis{name, "degree", {}, false};
+  for (int i = 0; i < count; ++i) axis.values.push_back(i * step);
+  return axis;
+}
+
+Grid regular(int theta_count, double theta_step, int phi_count, double phi_step) {
+  return {steps("theta_i", theta_count, theta_step), steps("theta_o", theta_count, theta_step),
+          steps("phi", phi_count, phi_step)};
+}
+
+}  // namespace
+
+std::vector<double> Axis::weights() const {
+  const std::size_t n = values.size();
+  if (n == 1) return {1.0};
+  std::vector<double> result(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double below = i > 0 ? values[i] - values[i - 1] : 0.0;
+    const double above = i + 1 < n ? values[i + 1] - values[i] : 0.0;
+    result[i] = 0.5 * (below + above);
+  }
+  if (midpoints) {
+    // The outermost cells reach as far out as they reach in.
+    result.front() *= 2.0;
+    result.back() *= 2.0;
+  }
+  return result;
+}
+
+Grid Grid::named_or_file(const std::string& name) {
+  if (name == "small") return regular(9, 10.0, 10, 20.0);
+  if (name == "default") return regular(18, 5.0, 19, 10.0);
+  if (name == "fine") return regular(36, 2.5, 37, 5.0);
+  std::error_code ignored;
+  if (!std::filesystem::exists(name, ignored)) {
+    throw Error(ExitCode::usage, "unknown grid '" + name + "'", "--grid",
+                "choose small, default, fine, or a JSON file {\"theta_i\":[…],\"theta_o\":[…],\"phi\":[…]}");
+  }
+  return from_json(parse_json(read_file(name), name), name);
+}
+
+Grid Grid::from_json(const Json& json, const std::string& place) {
+  const JsonReader reader(json, place);
+  reader.allow({"theta_i", "theta_o", "phi", "midpoints"});
+  const bool midpoints = reader.has("midpoints") && reader.at("midpoints").boolean();
+  const auto axis = [&](const char* name, double upper, bool closed) {
+    Axis result{name, "degree", reader.at(name).numbers(), midpoints};
+    for (std::size_t i = 0; i < result.values.size(); ++i) {
+      const double angle = result.values[i];
+      if (!(angle >= 0.0 && (closed ? angle <= upper : angle < upper))) {
+        throw reader.at(name).error(number_text(angle) + " is out of range",
+                                    "choose angles from 0 to " + std::string(closed ? "" : "below ") + number_text(upper) +
+                                        " degrees");
+      }
+      if (i > 0 && !(angle > result.values[i - 1])) {
+        throw reader.at(name).error("angles do not increase", "sort them and remove repetitions");
+      }
+    }
+    return result;
+  };
+  return {axis("theta_i", 90.0, false), axis("theta_o", 90.0, false), axis("phi", 180.0, true)};
+}
+
+std::size_t Table::parameter_rows() const {
+  std::size_t rows = 1;
+  for (const Axis& axis : parameter_axes) rows *= axis.size();
+  return rows;
+}
+
+std::size_t Table::masked() const { return static_cast<std::size_t>(std::count(valid.begin(), valid.end(), 0)); }
+
+void Table::allocate() {
+  const std::size_t count = static_cast<std::size_t>(channels) * entries();
+  values.assign(count, 0.0f);
+  stderr_values.assign(count, 0.0f);
+  valid.assign(entries(), 1);
+}
+
+Direction Table::wi(std::size_t entry) const {
+  return direction(radians(grid.theta_i.values[theta_i_index(entry)]), radians(grid.phi.values[phi_index(entry)]));
+}
+
+Direction Table::wo(std::size_t entry) const {
+  return direction(radians(grid.theta_o.values[theta_o_index(entry)]), 0.0);
+}
+
+std::vector<double> Table::parameter_values(std::size_t row) const {
+  std::vector<double> result(parameter_axes.size());
+  for (std::size_t i = parameter_axes.size(); i-- > 0;) {
+    result[i] = parameter_axes[i].values[row % parameter_axes[i].size()];
+    row /= parameter_axes[i].size();
+  }
+  return result;
+}
+
+Table Table::row_slice(std::size_t row) const {
+  Table slice = *this;
+  const std::vector<double> coordinates = parameter_values(row);
+  for (std::size_t i = 0; i < parameter_axes.size(); ++i) slice.parameters[parameter_axes[i].name] = coordinates[i];
+  slice.parameter_axes.clear();
+  const std::size_t count = slice.entries(), first = row * count;
+  const auto cut = [&](const auto& all, auto& part) {
+    part.clear();
+    for (std::size_t plane = 0; plane * entries() < all.size(); ++plane) {
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(plane * entries() + first);
+      part.insert(part.end(), begin, begin + static_cast<std::ptrdiff_t>(count));
+    }
+  };
+  cut(values, slice.values);
+  cut(stderr_values, slice.stderr_values);
+  cut(replicates, slice.replicates);
+  cut(sample_counts, slice.sample_counts);
+  cut(valid, slice.valid);
+  return slice;
+}
+
+Json Table::describe() const {
+  Json axes = Json::array();
+  const auto add = [&](const Axis& axis) {
+    axes.push_back({{"name", axis.name}, {"unit", axis.unit}, {"kind", axis.midpoints ? "midpoints" : "points"},
+                    {"values", axis.values}, {"weights", axis.weights()}});
+  };
+  for (const Axis& axis : parameter_axes) add(axis);
+  add(grid.theta_o);
+  add(grid.theta_i);
+  add(grid.phi);
+  return {{"axes", axes},
+          {"coordinates", "spherical"},
+          {"quantity", "brdf 1/sr"},
+          {"channels", channels == 1 ? Json{"Y"} : Json{"R", "G", "B"}},
+          {"entries", entries()},
+          {"masked", masked()},
+          {"replicates", replicates.empty() ? 0 : replicate_count},
+          {"provenance",
+           {{"reference", model}, {"params", parameters}, {"method", method}, {"seed", seed}, {"samples", samples},
+            {"shared_facets", shared_facets}, {"version", version}, {"command", command}}}};
+}
+
+}  // namespace lobefit

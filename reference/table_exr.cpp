@@ -1,0 +1,185 @@
+// Tables as OpenEXR files: one part, readable as a picture.
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+
+#include <array>
+
+#include "models/error.h"
+#include "reference/json_reader.h"
+#include "reference/table.h"
+
+namespace lobefit {
+
+namespace {
+
+const std::array<std::string, 3> rgb_names{"R", "G", "B"};
+
+std::string channel_name(const Table& table, int channel) {
+  return table.channels == 1 ? "Y" : rgb_names[static_cast<std::size_t>(channel)];
+}
+
+/// One named plane of a table's picture.
+struct Plane {
+  std::string name;
+  float* data;
+};
+
+/// Every float plane of an allocated table, in file terms. The mask is apart: it is stored as floats 0 and 1.
+std::vector<Plane> planes(Table& table) {
+  std::vector<Plane> result;
+  for (int c = 0; c < table.channels; ++c) {
+    const std::size_t offset = static_cast<std::size_t>(c) * table.entries();
+    const std::string name = channel_name(table, c);
+    result.push_back({name, table.values.data() + offset});
+    result.push_back({"stderr." + name, table.stderr_values.data() + offset});
+    for (std::size_t r = 0; r * table.values.size() < table.replicates.size(); ++r) {
+      result.push_back({"replicate." + std::to_string(r) + "." + name,
+                        table.replicates.data() + r * table.values.size() + offset});
+    }
+  }
+  if (!table.sample_counts.empty()) result.push_back({"samples", table.sample_counts.data()});
+  return result;
+}
+
+Imf::Slice slice(float* data, std::size_t width) {
+  return {Imf::FLOAT, reinterpret_cast<char*>(data), sizeof(float), sizeof(float) * width};
+}
+
+Error invalid(const std::filesystem::path& path, const std::string& what) {
+  return {ExitCode::invalid_input, what, path.string(),
+          "give a table that `lobefit render` wrote; `lobefit table info FILE` tells whether a file is one"};
+}
+
+}  // namespace
+
+void Table::write(const std::filesystem::path& path) const {
+  try {
+    Imf::Header header(static_cast<int>(width()), static_cast<int>(height()));
+    header.compression() = Imf::ZIP_COMPRESSION;
+    const Json description = describe();
+    const auto attribute = [&](const char* name, const std::string& text) {
+      header.insert(std::string("lobefit:") + name, Imf::StringAttribute(text));
+    };
+    attribute("coordinates", description["coordinates"]);
+    attribute("axes", description["axes"].dump());
+    attribute("quantity", description["quantity"]);
+    attribute("reference", model);
+    attribute("params", parameters.dump());
+    attribute("method", method);
+    attribute("seed", std::to_string(seed));
+    attribute("samples", std::to_string(samples));
+    attribute("shared_facets", shared_facets ? "true" : "false");
+    attribute("version", version);
+    attribute("command", command);
+
+    Table copy = *this;
+    std::vector<float> mask(valid.begin(), valid.end());
+    std::vector<Plane> all = planes(copy);
+    all.push_back({"A", mask.data()});
+    Imf::FrameBuffer frame;
+    for (const Plane& plane : all) {
+      header.channels().insert(plane.name, Imf::Channel(Imf::FLOAT));
+      frame.insert(plane.name, slice(plane.data, width()));
+    }
+    Imf::OutputFile file(path.c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writePixels(static_cast<int>(height()));
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(ExitCode::failure, std::string("can't write the table: ") + error.what(), path.string(),
+                "check the free space on the disk");
+  }
+}
+
+Table Table::read(const std::filesystem::path& path) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(path, code)) {
+    throw Error(ExitCode::invalid_input, "no such file", path.string(), "check the path");
+  }
+  try {
+    Imf::InputFile file(path.c_str());
+    const Imf::Header& header = file.header();
+    const auto attribute = [&](const char* name) -> std::string {
+      const auto* found = header.findTypedAttribute<Imf::StringAttribute>(std::string("lobefit:") + name);
+      if (!found) throw invalid(path, std::string("an EXR picture, but not a lobefit table: no attribute lobefit:") + name);
+      return found->value();
+    };
+    const auto number = [&](const char* name) {
+      const std::string text = attribute(name);
+      if (text.empty() || text.size() > 20 || text.find_first_not_of("0123456789") != std::string::npos) {
+        throw invalid(path, std::string("attribute lobefit:") + name + " is not a whole number");
+      }
+      return std::stoull(text);
+    };
+    const std::string coordinates = attribute("coordinates");
+    if (coordinates != "spherical") throw invalid(path, "unknown coordinates '" + coordinates + "'");
+
+    Table table;
+    const std::string axes_place = path.string() + ", lobefit:axes";
+    const Json axes = parse_json(attribute("axes"), axes_place);
+    for (const JsonReader& reader : JsonReader(axes, axes_place).elements()) {
+      Axis axis{reader.at("name").text(), reader.at("unit").text(), reader.at("values").numbers(),
+                reader.at("kind").text() == "midpoints"};
+      if (axis.name == "theta_i") table.grid.theta_i = axis;
+      else if (axis.name == "theta_o") table.grid.theta_o = axis;
+      else if (axis.name == "phi") table.grid.phi = axis;
+      else table.parameter_axes.push_back(axis);
+    }
+    if (table.grid.theta_i.size() * table.grid.theta_o.size() * table.grid.phi.size() == 0) {
+      throw invalid(path, "lobefit:axes lacks theta_i, theta_o or phi");
+    }
+    // Held against the picture's size before anything is allocated.
+    const auto window = header.dataWindow();
+    const auto width = static_cast<std::uint64_t>(std::int64_t{window.max.x} - window.min.x + 1);
+    const auto height = static_cast<std::uint64_t>(std::int64_t{window.max.y} - window.min.y + 1);
+    if (width != table.width() || height != table.height() || window.min.x != 0 || window.min.y != 0) {
+      throw invalid(path, "the picture is " + std::to_string(width) + " × " + std::to_string(height) +
+                              ", its axes say " + std::to_string(table.width()) + " × " + std::to_string(table.height()));
+    }
+    table.model = attribute("reference");
+    table.parameters = parse_json(attribute("params"), path.string() + ", lobefit:params");
+    table.method = attribute("method");
+    table.seed = number("seed");
+    table.samples = number("samples");
+    table.shared_facets = attribute("shared_facets") == "true";
+    table.version = attribute("version");
+    table.command = attribute("command");
+
+    table.channels = header.channels().findChannel("Y") ? 1 : 3;
+    table.allocate();
+    if (header.channels().findChannel("replicate.0." + channel_name(table, 0))) {
+      table.replicates.assign(table.values.size() * replicate_count, 0.0f);
+    }
+    if (header.channels().findChannel("samples")) table.sample_counts.assign(table.entries(), 0.0f);
+    std::vector<float> mask(table.entries());
+    std::vector<Plane> all = planes(table);
+    all.push_back({"A", mask.data()});
+    Imf::FrameBuffer frame;
+    for (const Plane& plane : all) {
+      const Imf::Channel* channel = header.channels().findChannel(plane.name);
+      if (!channel || channel->type != Imf::FLOAT) throw invalid(path, "no float channel '" + plane.name + "'");
+      frame.insert(plane.name, slice(plane.data, table.width()));
+    }
+    file.setFrameBuffer(frame);
+    file.readPixels(0, static_cast<int>(table.height()) - 1);
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      bool finite = mask[i] != 0.0f;
+      for (int c = 0; c < table.channels; ++c) {
+        finite = finite && std::isfinite(table.value(i, c)) && std::isfinite(table.standard_error(i, c));
+      }
+      table.valid[i] = finite ? 1 : 0;
+    }
+    return table;
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw invalid(path, std::string("not a readable EXR file: ") + error.what());
+  }
+}
+
+}  // namespace lobefit

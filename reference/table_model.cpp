@@ -1,0 +1,98 @@
+#include "reference/table_model.h"
+
+#include <algorithm>
+
+namespace lobefit {
+
+AxisMapping AxisMapping::parse(std::string_view text) {
+  const auto fail = [&]() {
+    return Error(ExitCode::usage, "'" + std::string(text) + "' is not a mapping", "--map",
+                 "write NAME=SCALE*AXIS^POWER, such as roughness=0.4*alpha^0.5");
+  };
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0) throw fail();
+  AxisMapping mapping;
+  mapping.parameter = text.substr(0, equals);
+  std::string_view rest = text.substr(equals + 1);
+  if (const std::size_t star = rest.find('*'); star != std::string_view::npos) {
+    mapping.scale = parse_number(rest.substr(0, star), "--map");
+    rest = rest.substr(star + 1);
+  }
+  if (const std::size_t caret = rest.find('^'); caret != std::string_view::npos) {
+    mapping.power = parse_number(rest.substr(caret + 1), "--map");
+    rest = rest.substr(0, caret);
+  }
+  if (rest.empty()) throw fail();
+  mapping.axis = rest;
+  return mapping;
+}
+
+TableModel::TableModel(const Model& model, const ParameterValues& values, const Table& table,
+                       const std::vector<AxisMapping>& mappings)
+    : model_(&model), table_(&table), set_by_axis_(values.flat().size(), false) {
+  std::vector<AxisMapping> all = mappings;
+  for (const Axis& axis : table.parameter_axes) {
+    const auto mapped = [&](const AxisMapping& mapping) { return mapping.axis == axis.name; };
+    if (std::any_of(mappings.begin(), mappings.end(), mapped)) continue;
+    if (values.has(axis.name)) {
+      all.push_back({axis.name, axis.name});
+      continue;
+    }
+    const auto rough = std::find_if(values.list().begin(), values.list().end(),
+                                    [](const ParameterInfo& info) { return info.perceptual_roughness; });
+    if (axis.name == "alpha" && rough != values.list().end()) all.push_back({std::string(rough->name), "alpha", 1.0, 0.5});
+    // A model without roughness, such as Lambert, is the same in every row.
+  }
+  for (const AxisMapping& mapping : all) {
+    const ParameterInfo& info = values.info(mapping.parameter);
+    for (int i = 0; i < info.components; ++i) set_by_axis_[static_cast<std::size_t>(info.offset + i)] = true;
+  }
+  for (std::size_t row = 0; row < table.parameter_rows(); ++row) {
+    ParameterValues at_row = values;
+    const std::vector<double> coordinates = table.parameter_values(row);
+    for (const AxisMapping& mapping : all) {
+      const auto axis = std::find_if(table.parameter_axes.begin(), table.parameter_axes.end(),
+                                     [&](const Axis& candidate) { return candidate.name == mapping.axis; });
+      if (axis == table.parameter_axes.end()) {
+        throw Error(ExitCode::usage, "the table has no axis '" + mapping.axis + "'", "--map " + mapping.parameter,
+                    "`lobefit table info` lists its axes");
+      }
+      const double coordinate = coordinates[static_cast<std::size_t>(axis - table.parameter_axes.begin())];
+      at_row.set(mapping.parameter, mapping.scale * std::pow(coordinate, mapping.power));
+    }
+    rows_.emplace_back(at_row.flat().begin(), at_row.flat().end());
+  }
+}
+
+Table TableModel::render() const {
+  Table result = *table_;
+  result.model = std::string(model_->info->name);
+  result.parameters = Json::object();
+  result.method = "exact";
+  result.replicates.clear();
+  result.sample_counts.clear();
+  std::fill(result.stderr_values.begin(), result.stderr_values.end(), 0.0f);
+  for (std::size_t entry = 0; entry < result.entries(); ++entry) {
+    const Rgb f = evaluate(entry);
+    const std::array<double, 3> components{f.x, f.y, f.z};
+    for (int c = 0; c < result.channels; ++c) {
+      result.values[static_cast<std::size_t>(c) * result.entries() + entry] =
+          static_cast<float>(components[static_cast<std::size_t>(c)]);
+    }
+  }
+  return result;
+}
+
+ParameterValues with_table_parameters(ParameterValues values, const Table& table) {
+  for (const auto& [name, value] : table.parameters.items()) {
+    if (!values.has(name) || value.is_string()) continue;
+    if (value.is_array()) {
+      values.set(name, value.get<std::vector<double>>());
+    } else {
+      values.set(name, value.get<double>());
+    }
+  }
+  return values;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,19 @@
+// Sampling of the facet normals that a direction sees.
+#pragma once
+
+#include <array>
+
+#include "models/geometry.h"
+#include "models/microfacet/distribution.h"
+
+namespace lobefit {
+
+/// A facet normal m with density D(m) (w·m)⁺ G1(w) / (w·n), w unit and above the surface.
+///
+/// GGX: a disk is mapped to the visible half of the stretched hemisphere (Heitz 2018, Sampling the GGX Distribution of
+/// Visible Normals); smooth in u. Beckmann: the visible slope along w by inversion of its distribution function, the
+/// slope across by the inverse error function (Heitz, d'Eon 2014, section 5 of the supplement).
+Direction sample_visible_normal(Distribution distribution, double alpha, const Direction& w,
+                                const std::array<double, 2>& u);
+
+}  // namespace lobefit
