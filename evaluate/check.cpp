@@ -105,6 +105,7 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
       const Rgb truth = model.evaluate(flat, pairs.wi(i), pairs.wo(i));
       const std::array<double, 3> expected{truth.x, truth.y, truth.z};
       const std::array<float, 3> found{values.r[i], values.g[i], values.b[i]};
+      const double cos_theta_i = pairs.wi(i).z;
       bool failed = false;
       for (std::size_t c = 0; c < 3; ++c) {
         if (!std::isfinite(found[c]) || !std::isfinite(expected[c])) {
@@ -115,7 +116,7 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
           continue;
         }
         const double error = std::abs(found[c] - expected[c]);
-        const double excess = error / (options.relative_bound * std::abs(expected[c]) + options.absolute_bound);
+        const double excess = error / (options.relative_bound * std::abs(expected[c]) + options.absolute_bound / cos_theta_i);
         e.squares += error * error;
         e.max_abs = max(e.max_abs, error);
         if (std::abs(expected[c]) >= smallest_relative_value) {

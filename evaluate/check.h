@@ -16,7 +16,9 @@ namespace lobefit {
 struct CheckOptions {
   std::uint64_t pairs = 1u << 20;
   std::uint64_t seed = 1;
-  /// A pair passes if |float - double| ≤ relative_bound |double| + absolute_bound (1/sr).
+  /// A pair passes if |float - double| ≤ relative_bound |double| + absolute_bound / cos theta_i. The absolute term
+  /// bounds what reaches the eye, f cos theta_i: forms with a term in 1/cos theta_i, such as Proxima's, multiply the
+  /// rounding of everything else by it.
   double relative_bound = 1e-5, absolute_bound = 1e-6;
 };
 

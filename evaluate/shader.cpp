@@ -42,6 +42,16 @@ std::string upper_case(std::string text) {
   return text;
 }
 
+/// Names that a local must not take: the parameter struct's, and words that either language reserves or defines.
+const std::set<std::string>& reserved_names() {
+  static const std::set<std::string> names{
+      "p",      "half",   "double",  "sample", "smooth", "flat",   "shared", "input",   "output", "common", "partition",
+      "active", "filter", "texture", "point",  "line",   "linear", "matrix", "vector",  "min",    "max",    "abs",
+      "clamp",  "lerp",   "mix",     "sqrt",   "exp",    "exp2",   "log",    "log2",    "pow",    "dot",    "normalize",
+      "cross",  "length", "step",    "fract",  "sign",   "mod",    "out",    "in",      "inout",  "discard"};
+  return names;
+}
+
 /// Binding strength, so that parentheses stand just where the graph needs them.
 enum Precedence { ternary, comparison, sum, product, unary, primary };
 
@@ -52,6 +62,7 @@ class FunctionPrinter {
     std::vector<const ShaderNode*> reachable;
     collect(function.result, reachable);
     std::sort(reachable.begin(), reachable.end(), [](auto* a, auto* b) { return a->order < b->order; });
+    taken_ = reserved_names();
     for (const ShaderArgument& argument : function.arguments) taken_.insert(argument.name);
     std::map<const ShaderNode*, const ShaderNode*> let_of;
     for (const ShaderNode* node : reachable) {

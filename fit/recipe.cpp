@@ -107,25 +107,31 @@ RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_value
   return row;
 }
 
-/// rms over the table of a rival, refitted per parameter row where the recipe says so.
-double score(const Rival& rival, const Table& table, Quantity quantity, const std::vector<double>& weights,
-             const RecipeRow& row, Monitor& monitor) {
+/// A rival over the table, refitted per parameter row where the recipe says so.
+RivalScore score(const Rival& rival, const Table& table, const RecipeRow& row, const std::vector<double>& weights,
+                 Monitor& monitor) {
   const Model& model = find_model(rival.model);
   ParameterValues values = with_table_parameters(model.defaults(), table);
   for (const auto& [name, components] : rival.set) values.set(name, components);
+  RivalScore result{.label = rival.label};
   if (rival.free_per_row.empty()) {
-    return rms_difference(table, TableModel(model, values, table, rival.mappings).render().values, quantity, weights);
+    result.values = TableModel(model, values, table, rival.mappings).render().values;
+  } else {
+    result.values.resize(table.values.size());
+    const std::size_t per_row = table.entries() / table.parameter_rows();
+    for (std::size_t r = 0; r < table.parameter_rows(); ++r) {
+      const Table slice = table.row_slice(r);
+      const FitOptions options{.free = rival.free_per_row, .quantity = row.quantity, .weights = row.weights};
+      const std::vector<float> part =
+          TableModel(model, fit(model, values, slice, options, monitor).values(), slice).render().values;
+      for (std::size_t c = 0; c < static_cast<std::size_t>(table.channels); ++c) {
+        std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(c * per_row), per_row,
+                    result.values.begin() + static_cast<std::ptrdiff_t>(c * table.entries() + r * per_row));
+      }
+    }
   }
-  double squares = 0.0;
-  const std::size_t per_row = table.entries() / table.parameter_rows();
-  for (std::size_t r = 0; r < table.parameter_rows(); ++r) {
-    const Table slice = table.row_slice(r);
-    FitOptions options{.free = rival.free_per_row, .quantity = quantity, .weights = row.weights};
-    const Fit fitted = fit(model, values, slice, options, monitor);
-    const auto first = weights.begin() + static_cast<std::ptrdiff_t>(r * per_row);
-    squares += std::accumulate(first, first + static_cast<std::ptrdiff_t>(per_row), 0.0) * fitted.solution.sum_of_squares;
-  }
-  return std::sqrt(squares);
+  result.rms = rms_difference(table, result.values, row.quantity, weights);
+  return result;
 }
 
 std::string constants_text(const RecipeResultRow& row, const Recipe& recipe) {
@@ -150,8 +156,14 @@ double distance(const RecipeResultRow& row, const Recipe& recipe) {
 }
 
 std::string conclude(const Recipe& recipe, const std::vector<RecipeResultRow>& rows) {
+  // Constants that every row frees first; the others are not decided here.
   std::string published, reproducing, others;
-  for (const auto& [name, value] : recipe.published) published += fmt::format("{}{} = {:g}", published.empty() ? "" : ", ", name, value);
+  for (const auto& [name, value] : recipe.published) {
+    const bool refitted = std::ranges::all_of(recipe.rows, [&](const RecipeRow& row) {
+      return std::ranges::find(row.free_sets.front(), name) != row.free_sets.front().end();
+    });
+    if (refitted) published += fmt::format("{}{} = {:g}", published.empty() ? "" : ", ", name, value);
+  }
   for (const RecipeResultRow& row : rows) {
     // Told once per row, by its first set of constants and its exact table.
     if (row.method != "exact" || row.free != row.row->free_sets.front()) continue;
@@ -241,32 +253,35 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
                known.row->grid.theta_o.values == row.grid.theta_o.values &&
                known.row->grid.phi.values == row.grid.phi.values;
       };
-      if (std::none_of(result.tables.begin(), result.tables.end(), same)) {
+      auto known = std::find_if(result.tables.begin(), result.tables.end(), same);
+      if (known == result.tables.end()) {
         const RenderOptions options{.sampling = {.samples = recipe.samples, .seed = seed},
                                     .exact = std::string_view(method) == "exact",
                                     .shared_facets = recipe.shared_facets};
         result.tables.push_back({row.name + "." + method, &row, method,
                                  render(find_reference(row.reference), row.reference_values, recipe.parameter_axes,
                                         row.grid, options, monitor)});
+        known = result.tables.end() - 1;
       }
       const Model& model = find_model(row.model);
-      const Table& table = std::find_if(result.tables.begin(), result.tables.end(), same)->table;
+      const Table& table = known->table;
       const std::vector<double> weights = entry_weights(table, row.weights, row.quantity);
 
-      ParameterValues published = with_table_parameters(recipe.fixed, table);
+      ParameterValues published = with_table_parameters(model.defaults(), table);
+      for (const ParameterInfo& info : recipe.fixed.list()) published.set(info.name, recipe.fixed.components(info));
       for (const auto& [name, value] : recipe.published) published.set(name, value);
-      const double rms_published =
-          rms_difference(table, TableModel(model, published, table).render().values, row.quantity, weights);
+      const std::vector<float> published_values = TableModel(model, published, table).render().values;
       std::vector<RivalScore> rivals;
-      for (const Rival& rival : recipe.rivals) {
-        rivals.push_back({rival.label, score(rival, table, row.quantity, weights, row, monitor)});
-      }
+      for (const Rival& rival : recipe.rivals) rivals.push_back(score(rival, table, row, weights, monitor));
       for (const std::vector<std::string>& free : row.free_sets) {
         const FitOptions options{.free = free, .quantity = row.quantity, .weights = row.weights, .seed = seed};
-        RecipeResultRow line{.row = &row, .method = method, .free = free,
+        RecipeResultRow line{.row = &row, .method = method,
+                             .table = static_cast<std::size_t>(known - result.tables.begin()), .free = free,
                              .fit = fit(model, published, table, options, monitor),
-                             .rms_published = rms_published, .rivals = rivals};
-        line.rms_refit = std::sqrt(line.fit.solution.sum_of_squares);
+                             .rms_published = rms_difference(table, published_values, row.quantity, weights),
+                             .published_values = published_values, .rivals = rivals};
+        line.refit_values = TableModel(model, line.fit.values(), table).render().values;
+        line.rms_refit = rms_difference(table, line.refit_values, row.quantity, weights);
         result.rows.push_back(std::move(line));
       }
     }

@@ -56,15 +56,18 @@ struct Recipe {
 struct RivalScore {
   std::string label;
   double rms;
+  std::vector<float> values;  // the rival over the row's table
 };
 
 /// One line of the result: a row, a method and a set of free parameters.
 struct RecipeResultRow {
   const RecipeRow* row;
   std::string method;  // "monte_carlo" or "exact"
+  std::size_t table;   // in RecipeResult::tables
   std::vector<std::string> free;
   Fit fit;
   double rms_published = 0.0, rms_refit = 0.0;
+  std::vector<float> published_values, refit_values;  // over the row's table
   std::vector<RivalScore> rivals;
 };
 

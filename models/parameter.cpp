@@ -26,21 +26,14 @@ int edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_name(std::string_view name, std::span<const std::string> names) {
-  std::string nearest;
-  int distance = 0;
-  for (const std::string& candidate : names) {
-    const int d = edit_distance(name, candidate);
-    if (nearest.empty() || d < distance) {
-      nearest = candidate;
-      distance = d;
-    }
-  }
-  return nearest;
+  const auto nearest = std::ranges::min_element(names, {}, [&](const std::string& n) { return edit_distance(name, n); });
+  return nearest == names.end() ? "" : *nearest;
 }
 
 double parse_number(std::string_view text, std::string_view what) {
   double value = 0.0;
-  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  // from_chars knows no plus sign.
+  const char* begin = text.data() + (text.starts_with('+') && !text.starts_with("+-") ? 1 : 0);
   const char* end = text.data() + text.size();
   const auto [rest, code] = std::from_chars(begin, end, value);
   if (code != std::errc{} || rest != end || !std::isfinite(value)) {
@@ -101,6 +94,9 @@ void ParameterValues::set(std::string_view name, std::span<const double> compone
       throw Error(ExitCode::usage, number_text(value) + " is out of range", where,
                   "choose a value from " + number_text(parameter.lower) + " to " + number_text(parameter.upper));
     }
+  }
+  if (!parameter.choices.empty() && components[0] != std::floor(components[0])) {
+    throw Error(ExitCode::usage, number_text(components[0]) + " is not a choice", where, "name one of the choices");
   }
   for (std::size_t i = 0; i < count; ++i) {
     flat_[static_cast<std::size_t>(parameter.offset) + i] = components[components.size() == 1 ? 0 : i];

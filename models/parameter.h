@@ -97,6 +97,10 @@ class ParameterValues {
   void set_text(std::string_view name, std::string_view text);
   /// First component.
   double get(std::string_view name) const { return flat_[static_cast<std::size_t>(info(name).offset)]; }
+  /// The slots of one parameter.
+  std::span<const double> components(const ParameterInfo& info) const {
+    return std::span(flat_).subspan(static_cast<std::size_t>(info.offset), static_cast<std::size_t>(info.components));
+  }
   std::string_view choice(std::string_view name) const;
   /// One value as people write it: `0.5`, `0.1,0.2,0.3` or a choice.
   std::string text(const ParameterInfo& info) const;

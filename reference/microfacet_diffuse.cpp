@@ -1,6 +1,7 @@
 #include "reference/microfacet_diffuse.h"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
 #include <boost/math/quadrature/tanh_sinh.hpp>
 #include <vector>
 
@@ -19,21 +20,36 @@ struct AzimuthIntegral {
     return (a * c + 0.5 * b * e * std::cos(delta)) * phi + a * e * std::sin(phi - delta) + b * c * std::sin(phi) +
            0.25 * b * e * std::sin(2.0 * phi - delta);
   }
-  double over(double from, double to) const { return to > from ? antiderivative(to) - antiderivative(from) : 0.0; }
+  double over(double from, double to) const {
+    if (to <= from) return 0.0;
+    if (to - from > 1.0) return antiderivative(to) - antiderivative(from);
+    // On a short arc the difference of antiderivatives loses digits, most of them between opposite grazing directions;
+    // nine Gauss-Legendre points are exact to rounding there, and all terms are positive.
+    double sum = 0.0;
+    const double centre = 0.5 * (from + to), half = 0.5 * (to - from);
+    const auto at = [&](double phi) { return (a + b * std::cos(phi)) * (c + e * std::cos(phi - delta)); };
+    using Rule = boost::math::quadrature::gauss<double, 9>;
+    for (std::size_t k = 0; k < Rule::abscissa().size(); ++k) {
+      const double offset = half * Rule::abscissa()[k];
+      sum += Rule::weights()[k] * (offset == 0.0 ? at(centre) : at(centre - offset) + at(centre + offset));
+    }
+    return half * sum;
+  }
 };
 
-/// Half width of the arc of facet azimuths that turn away from a direction at facet slope t: cos = μ/(t sin θ).
-double hidden_half_width(double t, double cosine, double sine) {
-  const double edge = t * sine;
-  return edge > cosine ? std::acos(cosine / edge) : 0.0;
+/// Half width of the arc of facet azimuths that turn away from a direction, facets being as (rise, run) steep.
+double hidden_half_width(double run, double rise, double cosine, double sine) {
+  const double edge = rise * sine, level = run * cosine;
+  return edge > level ? std::acos(level / edge) : 0.0;
 }
 
-/// The azimuthal part of K at facet slope t, over 2π: mean of (m·a)⁺ (m·b)⁺ / cos²θ_m.
-double azimuth_mean(double t, const Direction& a, const Direction& b, double sine_a, double sine_b, double delta) {
-  const AzimuthIntegral integral{a.z, t * sine_a, b.z, t * sine_b, delta};
+/// The azimuthal part of K for facets of slope rise/run, over 2π: mean of run² (m·a)⁺ (m·b)⁺ / cos²θ_m.
+double azimuth_mean(double run, double rise, const Direction& a, const Direction& b, double sine_a, double sine_b,
+                    double delta) {
+  const AzimuthIntegral integral{run * a.z, rise * sine_a, run * b.z, rise * sine_b, delta};
   // Facets turn away from a around azimuth π, from b around Δ + π. What is left is one arc, or two.
-  const double hidden_a = hidden_half_width(t, a.z, sine_a);
-  const double hidden_b = hidden_half_width(t, b.z, sine_b);
+  const double hidden_a = hidden_half_width(run, rise, a.z, sine_a);
+  const double hidden_b = hidden_half_width(run, rise, b.z, sine_b);
   double sum = 0.0;
   if (hidden_a + hidden_b < delta) {
     sum = integral.over(hidden_a - pi, delta - pi - hidden_b) + integral.over(delta - pi + hidden_b, pi - hidden_a);
@@ -73,23 +89,25 @@ double shared_visibility(Distribution distribution, double alpha, const Directio
   const double sine_a = std::hypot(a.x, a.y), sine_b = std::hypot(b.x, b.y);
   const double delta = std::abs(std::atan2(a.x * b.y - a.y * b.x, a.x * b.x + a.y * b.y));
 
-  // With t = α tan x the measure P22 t dt dφ of either distribution is smooth and bounded up to x = π/2:
-  // K = ∫ 2π α²P22 tan x sec²x cosθ_m azimuth_mean dx.
-  const auto integrand = [&](double x) {
-    const double tau = std::tan(x);
-    const double t = alpha * tau;
-    const double measure = distribution == Distribution::ggx
-                               ? 2.0 * std::sin(x) * std::cos(x)
-                               : 2.0 * tau * (1.0 + tau * tau) * std::exp(-tau * tau);
-    if (measure == 0.0) return 0.0;
-    return measure / std::sqrt(1.0 + t * t) * azimuth_mean(t, a, b, sine_a, sine_b, delta);
+  // With t = α cot x, all of it times sin x so that nothing overflows at x = 0, the far slopes, where floating point
+  // resolves x best:
+  // K = ∫ 2π α²P22 cot x csc²x cosθ_m azimuth_mean dx.
+  const auto integrand = [&](double x, double) {
+    const double s = std::sin(x), c = std::cos(x);
+    double measure = 2.0 * c;
+    if (distribution == Distribution::beckmann) {
+      const double tau = c / s;
+      if (!(tau < 26.0)) return 0.0;
+      measure *= std::exp(-tau * tau) / (s * s * s * s);
+    }
+    return measure / std::sqrt(s * s + alpha * alpha * c * c) * azimuth_mean(s, alpha * c, a, b, sine_a, sine_b, delta);
   };
 
   // The visible arcs change their shape where a facet can turn away from a, from b, or from both at once; the
   // integrand has a kink there.
   std::vector<double> knots{0.0, pi / 2.0};
   const auto add_knot = [&](double rise, double run) {
-    const double x = std::atan2(rise, alpha * run);
+    const double x = std::atan2(alpha * run, rise);
     if (x > 0.0 && x < pi / 2.0) knots.push_back(x);
   };
   add_knot(a.z, sine_a);
@@ -98,7 +116,7 @@ double shared_visibility(Distribution distribution, double alpha, const Directio
   add_knot(std::hypot(edge.x, edge.y), std::abs(edge.z));
   std::sort(knots.begin(), knots.end());
 
-  static boost::math::quadrature::tanh_sinh<double> integrator(15);
+  thread_local boost::math::quadrature::tanh_sinh<double> integrator(15);
   double sum = 0.0;
   for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
     if (knots[i + 1] - knots[i] > 1e-15) sum += integrator.integrate(integrand, knots[i], knots[i + 1], 1e-11);

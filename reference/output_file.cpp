@@ -1,7 +1,9 @@
 #include "reference/output_file.h"
 
+#include <openssl/evp.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -63,6 +65,22 @@ std::string read_file(const fs::path& path) {
   std::ostringstream content;
   content << file.rdbuf();
   return content.str();
+}
+
+std::string sha256_of_file(const fs::path& path) {
+  const std::string content = read_file(path);
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
+  unsigned int size = 0;
+  if (EVP_Digest(content.data(), content.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1) {
+    throw Error(ExitCode::failure, "OpenSSL could not compute SHA-256", path.string(), "check the OpenSSL installation");
+  }
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) {
+    text += digits[digest[i] >> 4];
+    text += digits[digest[i] & 15];
+  }
+  return text;
 }
 
 }  // namespace lobefit

@@ -29,4 +29,7 @@ class OutputFile {
 /// The whole of a text file; throws Error(invalid_input).
 std::string read_file(const std::filesystem::path& path);
 
+/// SHA-256 of a file's bytes in hexadecimal; throws Error(invalid_input).
+std::string sha256_of_file(const std::filesystem::path& path);
+
 }  // namespace lobefit

@@ -1,5 +1,7 @@
 #include "reference/references.h"
 
+#include <tbb/parallel_for.h>
+
 #include <array>
 
 #include "reference/microfacet_diffuse.h"
@@ -58,19 +60,25 @@ std::uint32_t SamplingOptions::per_replicate() const {
 }
 
 Estimate estimate(const Reference& reference, std::span<const double> flat, const Direction& wi, const Direction& wo,
-                  const SamplingOptions& options) {
-  std::array<std::array<double, replicate_count>, 3> means;
+                  const SamplingOptions& options, Monitor* monitor) {
+  Monitor silent;
+  Monitor& watch = monitor ? *monitor : silent;
   for (SamplingOptions current = options;; current.samples *= 2) {
-    for (std::uint32_t r = 0; r < replicate_count; ++r) {
-      Rgb mean;
+    std::array<Rgb, replicate_count> means;
+    watch.begin("reference " + std::string(reference.name), replicate_count);
+    tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(replicate_count), [&](std::uint32_t r) {
+      watch.check();
       reference.sample_row(flat, wo, {&wi, 1}, SamplePoints(options.sampler, {options.seed, 0, r}),
-                           current.per_replicate(), false, {&mean, 1});
-      means[0][r] = mean.x, means[1][r] = mean.y, means[2][r] = mean.z;
-    }
+                           current.per_replicate(), false, {&means[r], 1});
+      watch.advance(1);
+    });
+    watch.end();
     std::array<MeanAndError, 3> channel;
     double worst = 0.0;
     for (std::size_t c = 0; c < 3; ++c) {
-      channel[c] = mean_and_error(std::span<const double>(means[c]));
+      std::array<double, replicate_count> column;
+      for (std::size_t r = 0; r < replicate_count; ++r) column[r] = c == 0 ? means[r].x : c == 1 ? means[r].y : means[r].z;
+      channel[c] = mean_and_error(std::span<const double>(column));
       worst = max(worst, channel[c].standard_error);
     }
     if (options.stderr_target > 0.0 && worst > options.stderr_target && current.samples * 2 <= most_samples) continue;

@@ -7,6 +7,7 @@
 
 #include "models/parameter.h"
 #include "reference/estimate.h"
+#include "reference/monitor.h"
 #include "reference/sample_points.h"
 
 namespace lobefit {
@@ -47,6 +48,6 @@ inline constexpr std::uint64_t most_samples = std::uint64_t{1} << 30;
 
 /// Monte Carlo estimate at one pair, in double.
 Estimate estimate(const Reference& reference, std::span<const double> flat, const Direction& wi, const Direction& wo,
-                  const SamplingOptions& options);
+                  const SamplingOptions& options, Monitor* monitor = nullptr);
 
 }  // namespace lobefit

@@ -24,6 +24,12 @@ Canvas make_canvas(const ParameterValues& values, std::vector<Axis> parameter_ax
   table.model = values.owner();
   table.version = LOBEFIT_VERSION;
   table.parameters = Json::object();
+  for (const Axis& axis : table.parameter_axes) {
+    if (!values.info(axis.name).choices.empty()) {
+      throw Error(ExitCode::usage, "parameter '" + axis.name + "' can't be an axis", values.owner(),
+                  "it is a choice, not a number; render one table per choice with --set");
+    }
+  }
   for (const ParameterInfo& info : values.list()) {
     const bool is_axis = std::any_of(table.parameter_axes.begin(), table.parameter_axes.end(),
                                      [&](const Axis& axis) { return axis.name == info.name; });

@@ -108,6 +108,54 @@ std::vector<double> Table::parameter_values(std::size_t row) const {
   return result;
 }
 
+Table Table::with_values(const std::string& name, std::vector<float> other) const {
+  Table result;
+  result.grid = grid;
+  result.parameter_axes = parameter_axes;
+  result.channels = channels;
+  result.model = name;
+  result.parameters = Json::object();
+  result.method = "exact";
+  result.version = version;
+  result.values = std::move(other);
+  result.stderr_values.assign(result.values.size(), 0.0f);
+  result.valid = valid;
+  return result;
+}
+
+Rgb Table::interpolate(std::size_t row, const Direction& light, const Direction& view) const {
+  struct Place {
+    std::size_t index;
+    double fraction;
+  };
+  const auto locate = [](const Axis& axis, double angle) -> Place {
+    constexpr double tolerance = 1e-6;  // degrees: the angle went through a cosine
+    if (angle < axis.values.front() - tolerance || angle > axis.values.back() + tolerance) {
+      throw Error(ExitCode::usage, axis.name + " = " + number_text(angle) + " lies outside the table", "",
+                  "choose an angle from " + number_text(axis.values.front()) + " to " + number_text(axis.values.back()));
+    }
+    if (axis.size() == 1) return {0, 0.0};
+    const auto above = std::upper_bound(axis.values.begin(), axis.values.end() - 1, angle);
+    const std::size_t index = std::max<std::size_t>(1, static_cast<std::size_t>(above - axis.values.begin())) - 1;
+    const double fraction = (angle - axis.values[index]) / (axis.values[index + 1] - axis.values[index]);
+    return {index, std::clamp(fraction, 0.0, 1.0)};
+  };
+  const auto polar = [](const Direction& w) { return degrees(std::atan2(std::hypot(w.x, w.y), w.z)); };
+  const double azimuth = degrees(std::abs(std::atan2(light.x * view.y - light.y * view.x, light.x * view.x + light.y * view.y)));
+  const Place i = locate(grid.theta_i, polar(light)), o = locate(grid.theta_o, polar(view)), k = locate(grid.phi, azimuth);
+  std::array<double, 3> sum{};
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const auto step = [&](const Place& place, std::size_t bit) { return (corner >> bit & 1) != 0 ? place.fraction : 1.0 - place.fraction; };
+    const double weight = step(i, 0) * step(o, 1) * step(k, 2);
+    if (weight == 0.0) continue;
+    const std::size_t entry = (row * lines_per_parameter() + o.index + (corner >> 1 & 1)) * width() +
+                              (i.index + (corner & 1)) * grid.phi.size() + k.index + (corner >> 2 & 1);
+    if (!valid[entry]) throw Error(ExitCode::usage, "the table is masked there", "", "choose other angles");
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * value(entry, channels == 3 ? static_cast<int>(c) : 0);
+  }
+  return {sum[0], sum[1], sum[2]};
+}
+
 Table Table::row_slice(std::size_t row) const {
   Table slice = *this;
   const std::vector<double> coordinates = parameter_values(row);

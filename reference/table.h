@@ -86,6 +86,11 @@ struct Table {
   /// Values of the parameter axes in one row.
   std::vector<double> parameter_values(std::size_t row) const;
 
+  /// The same grid with other values and no errors, rendered from `name`.
+  Table with_values(const std::string& name, std::vector<float> other) const;
+  /// Value and error at any pair of directions: linear in the angles between grid points. Throws Error(usage) outside
+  /// the grid's angles, and where the row's neighbours are masked.
+  Rgb interpolate(std::size_t row, const Direction& light, const Direction& view) const;
   /// The table of one parameter row alone, without parameter axes.
   Table row_slice(std::size_t row) const;
 

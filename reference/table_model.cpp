@@ -65,22 +65,15 @@ TableModel::TableModel(const Model& model, const ParameterValues& values, const 
 }
 
 Table TableModel::render() const {
-  Table result = *table_;
-  result.model = std::string(model_->info->name);
-  result.parameters = Json::object();
-  result.method = "exact";
-  result.replicates.clear();
-  result.sample_counts.clear();
-  std::fill(result.stderr_values.begin(), result.stderr_values.end(), 0.0f);
-  for (std::size_t entry = 0; entry < result.entries(); ++entry) {
+  std::vector<float> values(table_->values.size());
+  for (std::size_t entry = 0; entry < table_->entries(); ++entry) {
     const Rgb f = evaluate(entry);
     const std::array<double, 3> components{f.x, f.y, f.z};
-    for (int c = 0; c < result.channels; ++c) {
-      result.values[static_cast<std::size_t>(c) * result.entries() + entry] =
-          static_cast<float>(components[static_cast<std::size_t>(c)]);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(table_->channels); ++c) {
+      values[c * table_->entries() + entry] = static_cast<float>(components[c]);
     }
   }
-  return result;
+  return table_->with_values(std::string(model_->info->name), std::move(values));
 }
 
 ParameterValues with_table_parameters(ParameterValues values, const Table& table) {

@@ -11,6 +11,8 @@ struct Chan2018 {
                                   .source = "Chan 2018, Material Advances in Call of Duty: WWII, SIGGRAPH course",
                                   .reciprocal = true,
                                   .energy_conserving = false,
+                                  // The bump's quadratic in gloss is negative around gloss 0.8, and nothing clamps it.
+                                  .non_negative = false,
                                   .doc = "Fit to multiple-scattering GGX diffuse facets, interpolated over gloss; gains energy in the furnace."};
 
   template <class T>

@@ -30,11 +30,11 @@ template <class P, class Visit>
 constexpr void describe_proxima(P& p, Visit&& visit) {
   visit(p.albedo, albedo_parameter);
   visit(p.alpha, alpha_parameter);
-  visit(p.a, ParameterInfo{.name = "a", .lower = -4.0, .upper = 4.0, .initial = -0.55, .tier = Tier::full,
+  visit(p.a, ParameterInfo{.name = "a", .lower = -2.0, .upper = 2.0, .initial = -0.55, .tier = Tier::full,
                            .doc = "Constant part of the roughness term."});
-  visit(p.b, ParameterInfo{.name = "b", .lower = -4.0, .upper = 4.0, .initial = 0.19, .tier = Tier::full,
+  visit(p.b, ParameterInfo{.name = "b", .lower = -2.0, .upper = 2.0, .initial = 0.19, .tier = Tier::full,
                            .doc = "Part of the roughness term that grows as 1/cos theta_i."});
-  visit(p.exponent, ParameterInfo{.name = "exponent", .symbol = "e", .lower = 0.05, .upper = 64.0, .initial = 0.5,
+  visit(p.exponent, ParameterInfo{.name = "exponent", .symbol = "e", .lower = 0.05, .upper = 16.0, .initial = 0.5,
                                   .tier = Tier::full, .doc = "Exponent of the fade in cos theta_k = -dot(V, L)."});
 }
 

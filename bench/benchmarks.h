@@ -1,0 +1,15 @@
+// What lobefit_bench measures.
+//
+// Every benchmark counts its evaluations with SetItemsProcessed, and names the benchmark it is to be compared with in
+// its label.
+#pragma once
+
+namespace lobefit {
+
+/// batch/single/MODEL against batch/libm/MODEL, and all models one after the other.
+void register_model_batches();
+
+/// The microfacet-diffuse reference: facets, samples (facet × direction pairs), quadrature.
+void register_integrator();
+
+}  // namespace lobefit

@@ -1,0 +1,179 @@
+#include "cli/arguments.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "reference/json_reader.h"
+#include "reference/output_file.h"
+
+namespace lobefit {
+
+void set_parameters(ParameterValues& values, const std::vector<std::string>& settings) {
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw Error(ExitCode::usage, "'" + setting + "' is not a setting", "--set", "write NAME=VALUE");
+    }
+    values.set_text(setting.substr(0, equals), std::string_view(setting).substr(equals + 1));
+  }
+}
+
+std::vector<Axis> parse_axes(const std::vector<std::string>& texts) {
+  std::vector<Axis> axes;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw Error(ExitCode::usage, "'" + text + "' is not an axis", "--axis", "write NAME=v1,v2,…");
+    }
+    const std::string name = text.substr(0, equals);
+    for (const Axis& axis : axes) {
+      if (axis.name == name) throw Error(ExitCode::usage, "axis '" + name + "' is given twice", "--axis", "give it once");
+    }
+    axes.push_back({name, "", parse_numbers(std::string_view(text).substr(equals + 1), "--axis " + name), false});
+  }
+  return axes;
+}
+
+Direction parse_direction(const std::string& text, const char* option) {
+  const std::vector<double> angles = parse_numbers(text, option);
+  if (angles.size() != 2) {
+    throw Error(ExitCode::usage, "expected two angles, got " + std::to_string(angles.size()), option,
+                "write THETA,PHI in degrees");
+  }
+  if (!(angles[0] >= 0.0 && angles[0] < 90.0)) {
+    throw Error(ExitCode::usage, "theta = " + number_text(angles[0]) + " is out of range", option,
+                "choose an angle from 0 to below 90 degrees: directions lie above the surface");
+  }
+  return direction(radians(angles[0]), radians(angles[1]));
+}
+
+Json rgb_json(const Rgb& value, int channels) {
+  return channels == 1 ? Json{value.x} : Json{value.x, value.y, value.z};
+}
+
+std::string rgb_text(const Rgb& value, int channels) {
+  return channels == 1 ? fmt::format("{:.9g}", value.x)
+                       : fmt::format("{:.9g}  {:.9g}  {:.9g}", value.x, value.y, value.z);
+}
+
+bool is_file(const std::string& name) {
+  std::error_code ignored;
+  return name.find('/') != std::string::npos || name.find('.') != std::string::npos ||
+         std::filesystem::is_regular_file(name, ignored);
+}
+
+void write_or_print(const std::string& text, const std::string& output, bool force) {
+  if (output.empty() || output == "-") {
+    std::fwrite(text.data(), 1, text.size(), stdout);
+    return;
+  }
+  OutputFile file(output, force);
+  file.write(text);
+  file.commit();
+}
+
+Json parameters_json(const ParameterValues& values) {
+  Json json = Json::object();
+  for (const ParameterInfo& info : values.list()) {
+    const std::span<const double> slots = values.components(info);
+    Json& member = json[std::string(info.name)];
+    if (!info.choices.empty()) {
+      member = std::string(values.choice(info.name));
+    } else if (info.components == 1) {
+      member = slots[0];
+    } else {
+      member = std::vector<double>(slots.begin(), slots.end());
+    }
+  }
+  return json;
+}
+
+namespace {
+
+bool is_grey(const ParameterValues& values) {
+  for (const ParameterInfo& info : values.list()) {
+    const std::span<const double> slots = values.components(info);
+    if (info.components == 3 && (slots[0] != slots[1] || slots[0] != slots[2])) return false;
+  }
+  return true;
+}
+
+/// The row of a table whose parameters are `settings`; a table without axes has one.
+std::size_t find_row(const Table& table, const std::vector<std::string>& settings) {
+  std::vector<std::size_t> index(table.parameter_axes.size(), 0);
+  std::vector<bool> set(table.parameter_axes.size(), false);
+  for (const std::string& setting : settings) {
+    const std::string name = setting.substr(0, setting.find('='));
+    const auto axis = std::find_if(table.parameter_axes.begin(), table.parameter_axes.end(),
+                                   [&](const Axis& candidate) { return candidate.name == name; });
+    if (axis == table.parameter_axes.end() || name.size() + 1 >= setting.size()) {
+      throw Error(ExitCode::usage, "the table has no axis for '" + setting + "'", "--set",
+                  "`lobefit table info` lists its axes");
+    }
+    const double value = parse_number(std::string_view(setting).substr(name.size() + 1), "--set " + name);
+    const auto found = std::find_if(axis->values.begin(), axis->values.end(),
+                                    [&](double v) { return std::abs(v - value) <= 1e-9 * max(1.0, std::abs(v)); });
+    if (found == axis->values.end()) {
+      throw Error(ExitCode::usage, "the table has no row at " + setting, "--set",
+                  "choose one of the axis' values: `lobefit table info` lists them");
+    }
+    const auto number = static_cast<std::size_t>(axis - table.parameter_axes.begin());
+    index[number] = static_cast<std::size_t>(found - axis->values.begin());
+    set[number] = true;
+  }
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    if (!set[i] && table.parameter_axes[i].size() > 1) {
+      throw Error(ExitCode::usage, "which " + table.parameter_axes[i].name + "?", "--set",
+                  "the table has an axis of it: add --set " + table.parameter_axes[i].name + "=VALUE");
+    }
+    row = row * table.parameter_axes[i].size() + index[i];
+  }
+  return row;
+}
+
+}  // namespace
+
+Source find_source(const std::string& name, const std::vector<std::string>& settings) {
+  if (const Reference* reference = find_reference_or_null(name)) {
+    ParameterValues values = reference->defaults();
+    set_parameters(values, settings);
+    return {name, is_grey(values) ? 1 : 3,
+            [reference, values](const Direction& wi, const Direction& wo) { return reference->exact(values.flat(), wi, wo); },
+            parameters_json(values)};
+  }
+  if (is_file(name)) {
+    const auto table = std::make_shared<Table>(Table::read(name));
+    const std::size_t row = find_row(*table, settings);
+    Json parameters = table->parameters;
+    const std::vector<double> coordinates = table->parameter_values(row);
+    for (std::size_t i = 0; i < coordinates.size(); ++i) parameters[table->parameter_axes[i].name] = coordinates[i];
+    return {name, table->channels,
+            [table, row](const Direction& wi, const Direction& wo) { return table->interpolate(row, wi, wo); }, parameters};
+  }
+  const Model& model = find_model(name);
+  ParameterValues values = model.defaults();
+  set_parameters(values, settings);
+  return {name, 3,
+          [&model, values](const Direction& wi, const Direction& wo) { return model.evaluate(values.flat(), wi, wo); },
+          parameters_json(values)};
+}
+
+ModelChoice find_model_or_fit(const std::string& name, const std::vector<std::string>& settings) {
+  ModelChoice choice;
+  if (is_file(name)) {
+    const Json json = parse_json(read_file(name), name);
+    choice.fit = Fit::from_json(json, name);
+    choice.model = &find_model(choice.fit->model);
+    choice.values = choice.fit->values();
+    choice.mappings = choice.fit->mappings;
+  } else {
+    choice.model = &find_model(name);
+    choice.values = choice.model->defaults();
+  }
+  set_parameters(choice.values, settings);
+  return choice;
+}
+
+}  // namespace lobefit

@@ -1,0 +1,120 @@
+// lobefit check: the model as a GPU runs it against double precision and against a table.
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "cli/arguments.h"
+#include "cli/slice.h"
+#include "evaluate/check.h"
+
+namespace lobefit {
+
+namespace {
+
+struct CheckArguments {
+  std::string name, table, device = "simd";
+  std::vector<std::string> settings, mappings;
+  bool all = false;
+  CheckOptions options;
+};
+
+constexpr int parameter_set_count = 16;
+
+CheckResult check_one(const CheckArguments& a, const std::string& name, const Context& context) {
+  ModelChoice choice = find_model_or_fit(name, a.settings);
+  // A fit's parameters stay; what a table's axis set for it, and all of a bare model's that are not given, vary.
+  std::vector<std::string> vary;
+  for (const ParameterInfo& info : choice.values.list()) {
+    const std::string parameter(info.name);
+    const bool fitted = choice.fit && std::any_of(choice.fit->parameters.begin(), choice.fit->parameters.end(),
+                                                  [&](const FitParameter& p) { return p.name.substr(0, p.name.find('.')) == parameter; });
+    const bool given = std::any_of(a.settings.begin(), a.settings.end(),
+                                   [&](const std::string& s) { return s.starts_with(parameter + "="); });
+    if (!fitted && !given) vary.push_back(parameter);
+  }
+  const auto monitor = context.monitor();
+  CheckResult result = check_simd(*choice.model, varied_parameters(choice.values, vary, parameter_set_count, context.seed),
+                                  a.options, *monitor);
+  if (!a.table.empty()) {
+    const Table table = Table::read(a.table);
+    const ModelChoice on_table = choose_for_table(name, a.settings, a.mappings, table);
+    result.table = check_against_table(TableModel(*on_table.model, on_table.values, table, on_table.mappings), table);
+  }
+  return result;
+}
+
+void print_result(const CheckResult& r) {
+  fmt::print("  {:<20} {:<5} {:>9} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>8.1f}  {}\n", r.model, r.device, r.pairs,
+             r.max_abs, r.max_rel, r.p999_rel, r.rms, r.rms_rel, r.evaluations_per_s * 1e-6, r.passed ? "passed" : "FAILED");
+  if (r.table) fmt::print("  against the table: rms {:.6g} in double, {:.6g} in float\n", r.table->rms_double, r.table->rms_float);
+}
+
+std::string worst_text(const CheckResult& r) {
+  std::string parameters;
+  for (const ParameterInfo& info : r.worst_parameters.list()) {
+    parameters += fmt::format(" --set {}={}", info.name, r.worst_parameters.text(info));
+  }
+  const auto angles = [](const Direction& w) {
+    return fmt::format("{:.9g},{:.9g}", degrees(std::acos(w.z)), degrees(std::atan2(w.y, w.x)));
+  };
+  return fmt::format("lobefit eval {}{} --wi {} --wo {}", r.model, parameters, angles(r.worst_wi), angles(r.worst_wo));
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, Context& context) {
+  CLI::App* verb = app.add_subcommand(
+      "check",
+      "Run a model as a GPU would (vectorised float) against double precision, and against a table\n"
+      "  lobefit check fit.json --table truth.exr\n"
+      "  lobefit check --all\n"
+      "A pair passes if |float - double| <= 1e-5 |double| + 1e-6/cos(theta_i); one in eight pairs is hostile: grazing to\n"
+      "within 1e-6 of the horizon, retro, mirror or normal. Relative errors are reported for values above 1e-3 1/sr. A fit keeps its parameters; what it does not hold varies over 16 parameter sets.");
+  const auto a = std::make_shared<CheckArguments>();
+  auto* name = verb->add_option("NAME", a->name, "Fit (.json) or model");
+  auto* all = verb->add_flag("--all", a->all, "Every registered model");
+  name->excludes(all);
+  add_repeatable(*verb, "--set", a->settings, "NAME=VALUE holds a parameter (repeatable)");
+  verb->add_option("--table", a->table, "Also compare over this table's grid");
+  add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER for --table (repeatable)");
+  verb->add_option("--device", a->device, "simd, vulkan or all")
+      ->check(CLI::IsMember({"simd", "vulkan", "all"}))
+      ->capture_default_str();
+  verb->add_option("--pairs", a->options.pairs, "Pairs of directions")
+      ->check(CLI::Range(std::uint64_t{1024}, std::uint64_t{1} << 28))
+      ->capture_default_str();
+  verb->callback([&context, a] {
+    if (a->device == "vulkan") {
+      throw Error(ExitCode::missing_part, "this build has no Vulkan evaluator", "--device vulkan", "use --device simd");
+    }
+    if (a->name.empty() && !a->all) throw Error(ExitCode::usage, "check what?", "check", "name a fit or a model, or use --all");
+    a->options.seed = context.seed;
+    std::vector<CheckResult> results;
+    if (a->all) {
+      for (const Model& model : models()) results.push_back(check_one(*a, std::string(model.info->name), context));
+    } else {
+      results.push_back(check_one(*a, a->name, context));
+    }
+    if (context.json) {
+      Json list = Json::array();
+      for (const CheckResult& result : results) list.push_back(result.json());
+      std::cout << (a->all ? Json{{"checks", list}} : list[0]).dump(2) << "\n";
+    } else {
+      fmt::print("  {:<20} {:<5} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}\n", "model", "dev", "pairs", "max abs", "max rel",
+                 "p999 rel", "rms", "rms rel", "M eval/s");
+      for (const CheckResult& result : results) print_result(result);
+      if (context.verbose) {
+        for (const CheckResult& result : results) fmt::print("  worst: {}\n", worst_text(result));
+      }
+    }
+    for (const CheckResult& result : results) {
+      if (!result.passed) {
+        throw Error(ExitCode::check_failed,
+                    fmt::format("{} of {} pairs exceed the bound", result.failures, result.pairs), result.model,
+                    "look at the worst with `" + worst_text(result) + "`");
+      }
+    }
+  });
+}
+
+}  // namespace lobefit

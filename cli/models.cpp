@@ -1,0 +1,132 @@
+// lobefit models, lobefit references: what there is, and its parameters.
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "cli/arguments.h"
+#include "evaluate/float_model.h"
+
+namespace lobefit {
+
+namespace {
+
+Json parameter_json(const ParameterInfo& info) {
+  Json json{{"name", info.name}, {"symbol", info.symbol}, {"unit", info.unit}, {"components", info.components}};
+  if (info.choices.empty()) {
+    json["range"] = {info.lower, info.upper};
+    json["default"] = info.initial;
+  } else {
+    json["choices"] = info.choices;
+    json["default"] = info.choices[static_cast<std::size_t>(info.initial)];
+  }
+  json["tier"] = tier_name(info.tier);
+  json["doc"] = info.doc;
+  return json;
+}
+
+void print_parameters(const std::vector<ParameterInfo>& parameters) {
+  fmt::print("\n  {:<22} {:<6} {:<20} {:<9} {:<9} {}\n", "parameter", "symbol", "range", "default", "tier", "meaning");
+  for (const ParameterInfo& info : parameters) {
+    std::string range, initial;
+    if (info.choices.empty()) {
+      range = fmt::format("{:g} … {:g}{}{}", info.lower, info.upper, info.unit.empty() ? "" : " ", info.unit);
+      initial = fmt::format("{:g}", info.initial);
+    } else {
+      for (const std::string_view choice : info.choices) range += (range.empty() ? "" : "|") + std::string(choice);
+      initial = info.choices[static_cast<std::size_t>(info.initial)];
+    }
+    fmt::print("  {:<22} {:<6} {:<20} {:<9} {:<9} {}{}\n", info.name, info.symbol, range, initial, tier_name(info.tier),
+               info.doc, info.components == 3 ? " (r,g,b or one number)" : "");
+  }
+}
+
+Json model_json(const Model& model) {
+  const OperationCount operations = count_operations(find_float_model(model.info->name).trace());
+  Json parameters = Json::array();
+  for (const ParameterInfo& info : model.parameters) parameters.push_back(parameter_json(info));
+  return {{"name", model.info->name},
+          {"kind", "brdf"},
+          {"title", model.info->title},
+          {"doc", model.info->doc},
+          {"params", parameters},
+          {"source", model.info->source},
+          {"properties",
+           {{"reciprocal", model.info->reciprocal}, {"energy_conserving", model.info->energy_conserving},
+            {"isotropic", model.info->isotropic}, {"non_negative", model.info->non_negative}}},
+          {"operations",
+           {{"total", operations.total()}, {"add_multiply", operations.add_multiply}, {"divide", operations.divide},
+            {"square_root", operations.square_root}, {"transcendental", operations.transcendental},
+            {"compare_select", operations.compare_select}}}};
+}
+
+void print_model(const Model& model) {
+  const ModelInfo& info = *model.info;
+  const OperationCount operations = count_operations(find_float_model(info.name).trace());
+  fmt::print("{}: {}\n  {}\n  Source: {}\n", info.name, info.title, info.doc, info.source);
+  fmt::print("  {}, {}, {}, {}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
+             info.energy_conserving ? "energy conserving" : "can reflect more than it receives",
+             info.isotropic ? "isotropic" : "anisotropic", info.non_negative ? "never negative" : "can be negative");
+  fmt::print("  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} compare/select)\n",
+             operations.total(), operations.add_multiply, operations.divide, operations.square_root,
+             operations.transcendental, operations.compare_select);
+  print_parameters(model.parameters);
+}
+
+}  // namespace
+
+void add_models(CLI::App& app, Context& context) {
+  CLI::App* verb = app.add_subcommand("models", "List models; for one: parameters, source, properties, cost");
+  const auto name = std::make_shared<std::string>();
+  verb->add_option("NAME", *name, "Model to describe");
+  verb->callback([&context, name] {
+    if (context.json) {
+      Json list = Json::array();
+      if (name->empty()) {
+        for (const Model& model : models()) list.push_back(model_json(model));
+      } else {
+        list.push_back(model_json(find_model(*name)));
+      }
+      std::cout << Json{{"models", list}}.dump(2) << "\n";
+    } else if (!name->empty()) {
+      print_model(find_model(*name));
+    } else {
+      fmt::print("  {:<20} {:<52} {}\n", "model", "title", "parameters");
+      for (const Model& model : models()) {
+        std::string parameters;
+        for (const ParameterInfo& info : model.parameters) parameters += (parameters.empty() ? "" : " ") + std::string(info.name);
+        fmt::print("  {:<20} {:<52} {}\n", model.info->name, model.info->title, parameters);
+      }
+      fmt::print("\n`lobefit models NAME` describes one.\n");
+    }
+  });
+}
+
+void add_references(CLI::App& app, Context& context) {
+  CLI::App* verb = app.add_subcommand("references", "List the reference integrators; for one: its parameters");
+  const auto name = std::make_shared<std::string>();
+  verb->add_option("NAME", *name, "Reference to describe");
+  verb->callback([&context, name] {
+    std::vector<const Reference*> chosen;
+    if (name->empty()) {
+      for (const Reference& reference : references()) chosen.push_back(&reference);
+    } else {
+      chosen.push_back(&find_reference(*name));
+    }
+    Json list = Json::array();
+    for (const Reference* reference : chosen) {
+      if (context.json) {
+        Json parameters = Json::array();
+        for (const ParameterInfo& info : reference->parameters) parameters.push_back(parameter_json(info));
+        list.push_back({{"name", reference->name}, {"doc", reference->doc}, {"source", reference->source},
+                        {"exact", true}, {"params", parameters}});
+      } else {
+        fmt::print("{}: {}\n  Source: {}\n  Methods: monte_carlo (visible normals, sobol or philox), exact (quadrature)\n",
+                   reference->name, reference->doc, reference->source);
+        print_parameters(reference->parameters);
+      }
+    }
+    if (context.json) std::cout << Json{{"references", list}}.dump(2) << "\n";
+  });
+}
+
+}  // namespace lobefit

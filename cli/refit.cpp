@@ -1,0 +1,261 @@
+// lobefit refit: a recipe from reference to result, with figures, checks and shaders.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <iostream>
+#include <set>
+
+#include "cli/arguments.h"
+#include "cli/output_folder.h"
+#include "cli/shader_text.h"
+#include "evaluate/check.h"
+#include "evaluate/shader.h"
+#include "fit/recipe.h"
+#include "reference/output_file.h"
+#include "report/figure.h"
+
+namespace lobefit {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path recipe_folder() {
+  // Beside the program's sources when run from the build tree; an installed program has them elsewhere.
+  if (const char* folder = std::getenv("LOBEFIT_DATA")) return fs::path(folder) / "recipes";
+  return fs::path(LOBEFIT_DATA_FOLDER) / "recipes";
+}
+
+std::vector<std::string> shipped_recipes() {
+  std::vector<std::string> names;
+  std::error_code ignored;
+  for (const auto& file : fs::directory_iterator(recipe_folder(), ignored)) {
+    if (file.path().extension() == ".json") names.push_back(file.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path find_recipe(const std::string& name) {
+  std::error_code ignored;
+  if (fs::is_regular_file(name, ignored)) return name;
+  const fs::path shipped = recipe_folder() / (name + ".json");
+  if (fs::is_regular_file(shipped, ignored)) return shipped;
+  const std::vector<std::string> names = shipped_recipes();
+  throw Error(ExitCode::usage, "unknown recipe '" + name + "'", "",
+              "did you mean '" + nearest_name(name, names) + "'? A recipe of your own is given by its path");
+}
+
+/// File name of a fit: row, method and free parameters.
+std::string stem(const RecipeResultRow& line) {
+  std::string free;
+  for (const std::string& name : line.free) free += "-" + name;
+  return line.row->name + "." + line.method + free;
+}
+
+std::string interval_text(const FitParameter& p) {
+  if (!p.estimate.identifiable) return "not identifiable";
+  if (p.estimate.at_bound) return fmt::format("{:.4g}, at its bound", p.estimate.value);
+  if (p.estimate.standard_error == 0.0) return fmt::format("{:.5f}", p.estimate.value);
+  return fmt::format("{:.5f} [{:.5f}, {:.5f}]", p.estimate.value, p.estimate.ci_low, p.estimate.ci_high);
+}
+
+/// The result as a Markdown page.
+std::string result_page(const Recipe& recipe, const RecipeResult& result, const std::string& command) {
+  std::string page = "# " + recipe.title + "\n\n" + recipe.description + "\n\n**" + result.conclusion + "**\n\n";
+  page += "Made by `" + command + "`, lobefit " LOBEFIT_VERSION ". Intervals are 95 %, from the Monte Carlo error of the reference.\n\n";
+  page += "| row | method |";
+  std::vector<std::string> names;
+  for (const auto& [name, value] : recipe.published) names.push_back(name);
+  for (const std::string& name : names) page += " " + name + " |";
+  page += " rms published | rms refit |";
+  for (const Rival& rival : recipe.rivals) page += " " + rival.label + " |";
+  page += "\n|---|---|";
+  for (std::size_t i = 0; i < names.size() + 2 + recipe.rivals.size(); ++i) page += "---|";
+  page += "\n";
+  for (const RecipeResultRow& line : result.rows) {
+    page += "| " + line.row->name + " | " + line.method + " |";
+    for (const std::string& name : names) {
+      std::string cell = "";
+      for (const FitParameter& p : line.fit.parameters) {
+        if (p.name == name) cell = p.free ? interval_text(p) : fmt::format("({:g})", p.estimate.value);
+      }
+      page += " " + cell + " |";
+    }
+    page += fmt::format(" {:.4f} | {:.4f} |", line.rms_published, line.rms_refit);
+    for (const RivalScore& rival : line.rivals) page += fmt::format(" {:.3f} |", rival.rms);
+    page += "\n";
+  }
+  page += "\nConstants in parentheses were held. rms is that of the row's own metric and weights.\n";
+  return page;
+}
+
+void print_result(const RecipeResult& result) {
+  fmt::print("  {:<36} {:<12} {:<52} {:>9} {:>8}\n", "row", "method", "constants", "published", "refit");
+  for (const RecipeResultRow& line : result.rows) {
+    std::string constants;
+    for (const FitParameter& p : line.fit.parameters) {
+      if (!p.free) continue;
+      constants += fmt::format("{}{} {:.4f}{}", constants.empty() ? "" : "  ", p.name, p.estimate.value,
+                               !p.estimate.identifiable ? " (no effect)" : p.estimate.at_bound ? " (bound)" : "");
+    }
+    fmt::print("  {:<36} {:<12} {:<52} {:>9.4f} {:>8.4f}\n", line.row->name, line.method, constants, line.rms_published,
+               line.rms_refit);
+  }
+  fmt::print("\n{}\n", result.conclusion);
+}
+
+/// The lines of a figure: published, refit and the rivals, best first, as far as they can be told apart.
+std::vector<LabelledTable> labelled(const RecipeResult& result, const RecipeResultRow& line, std::size_t most) {
+  const Table& table = result.tables[line.table].table;
+  std::vector<LabelledTable> tables{{"published", table.with_values("published", line.published_values)},
+                                    {"refit", table.with_values("refit", line.refit_values)}};
+  std::vector<const RivalScore*> rivals;
+  for (const RivalScore& rival : line.rivals) rivals.push_back(&rival);
+  std::ranges::sort(rivals, {}, [](const RivalScore* rival) { return rival->rms; });
+  for (const RivalScore* rival : rivals) {
+    if (tables.size() < most) tables.push_back({rival->label, table.with_values(rival->label, rival->values)});
+  }
+  return tables;
+}
+
+void write_figures(const RecipeResult& result, const OutputFolder& folder) {
+  std::set<std::string> drawn;
+  for (const RecipeResultRow& line : result.rows) {
+    if (line.method != "monte_carlo" || !drawn.insert(line.row->name).second) continue;
+    const Table& table = result.tables[line.table].table;
+    const std::vector<LabelledTable> lines = labelled(result, line, 6);
+    const auto write = [&](const std::string& kind, const std::string& program) {
+      for (const char* extension : {".svg", ".png"}) write_figure(program, folder.path(line.row->name + "." + kind + extension), true);
+    };
+    write("slices", slice_figure(table, lines, {}, line.row->name + ": normal view"));
+    if (table.grid.theta_o.size() > 1) {
+      const std::size_t mirror = table.grid.phi.size() - 1;
+      const std::size_t oblique = table.grid.theta_o.size() * 2 / 3;
+      const std::string view = fmt::format("{}: view at {:g}°", line.row->name, table.grid.theta_o.values[oblique]);
+      write("slices_retro", slice_figure(table, lines, {.theta_o = oblique, .phi = 0}, view));
+      write("slices_mirror", slice_figure(table, lines, {.theta_o = oblique, .phi = mirror}, view));
+      const std::vector<LabelledTable> few = labelled(result, line, 4);
+      write("residuals_retro", residual_figure(table, few, {}, line.row->name + ": retro side"));
+      write("residuals_mirror", residual_figure(table, few, {.phi = mirror}, line.row->name + ": mirror side"));
+    }
+  }
+}
+
+/// Every fitted model in float against double; the JSON list for the result. False if one fails.
+bool check_fits(const RecipeResult& result, const Context& context, Monitor& monitor, Json& list) {
+  bool passed = true;
+  for (const RecipeResultRow& line : result.rows) {
+    if (line.method != "exact") continue;
+    const Table& table = result.tables[line.table].table;
+    const TableModel on_table(find_model(line.row->model), line.fit.values(), table);
+    // The parameter sets of the table's rows: what the fit is for.
+    std::vector<ParameterValues> sets;
+    for (std::size_t row = 0; row < table.parameter_rows(); ++row) {
+      ParameterValues set = line.fit.values();
+      std::ranges::copy(on_table.row(row), set.flat().begin());
+      sets.push_back(std::move(set));
+    }
+    CheckResult check = check_simd(on_table.model(), sets, {.seed = context.seed}, monitor);
+    check.table = check_against_table(on_table, table);
+    Json document = check.json();
+    // A rate is not a result: the same run gives the same file.
+    document.erase("evaluations_per_s");
+    list.push_back({{"row", line.row->name}, {"free", line.free}, {"check", document}});
+    passed = passed && check.passed;
+  }
+  return passed;
+}
+
+bool run(const std::string& name, const std::string& output, const Context& context) {
+  const Recipe recipe = Recipe::read(find_recipe(name));
+  OutputFolder folder(output.empty() ? fs::path("out") / recipe.name : fs::path(output), context.force);
+  const auto monitor = context.monitor();
+  RecipeResult result = run_recipe(recipe, context.seed, *monitor);
+
+  std::vector<std::string> hashes;
+  for (RecipeTable& table : result.tables) {
+    monitor->check();
+    table.table.command = context.command;
+    table.table.write(folder.path(table.name + ".exr"));
+    hashes.push_back(sha256_of_file(folder.path(table.name + ".exr")));
+  }
+  for (const RecipeResultRow& line : result.rows) {
+    OutputFile fit(folder.path(stem(line) + ".fit.json"), true);
+    fit.write(line.fit.json(context.command, hashes[line.table]).dump(2) + "\n");
+    fit.commit();
+  }
+  // The shader of each row's first set of constants, in each language.
+  for (const RecipeResultRow& line : result.rows) {
+    if (line.method != "monte_carlo" || line.free != line.row->free_sets.front()) continue;
+    for (const std::string& language : shader_languages()) {
+      OutputFile shader(folder.path(line.row->name + "." + language), true);
+      shader.write(shader_text(find_model(line.row->model), line.fit.values(), &line.fit, language, context.command,
+                               "Constants of row " + line.row->name));
+      shader.commit();
+    }
+  }
+  monitor->check();
+  write_figures(result, folder);
+
+  Json document = result.json(recipe, context.command, context.seed);
+  Json checks = Json::array();
+  const bool passed = check_fits(result, context, *monitor, checks);
+  document["checks"] = checks;
+  OutputFile page(folder.path("result.md"), true);
+  page.write(result_page(recipe, result, context.command));
+  page.commit();
+  OutputFile json(folder.path("result.json"), true);
+  json.write(document.dump(2) + "\n");
+  json.commit();
+  folder.commit();
+
+  if (context.json) {
+    std::cout << document.dump(2) << "\n";
+  } else {
+    print_result(result);
+    fmt::print("\nWritten to {}: result.json, result.md, tables, fits, shaders and figures; open {}\n",
+               folder.destination().string(), (folder.destination() / (recipe.rows.front().name + ".slices.png")).string());
+  }
+  if (!passed) {
+    throw Error(ExitCode::check_failed, "a fitted model in float strays from double precision", folder.destination().string(),
+                "see \"checks\" in result.json");
+  }
+  return passed;
+}
+
+}  // namespace
+
+void add_refit(CLI::App& app, Context& context) {
+  std::string shipped;
+  for (const std::string& name : shipped_recipes()) shipped += (shipped.empty() ? "" : ", ") + name;
+  CLI::App* verb = app.add_subcommand(
+      "refit",
+      "Run a recipe end to end: render its references, fit, check, draw, export\n"
+      "  lobefit refit proxima -o out/proxima\n"
+      "  lobefit refit my_recipe.json\n"
+      "Shipped recipes: " + shipped);
+  struct Arguments {
+    std::string name, output;
+    bool all = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  auto* name = verb->add_option("RECIPE", a->name, "Shipped recipe or JSON file");
+  auto* all = verb->add_flag("--all", a->all, "Every shipped recipe");
+  name->excludes(all);
+  verb->add_option("-o,--output", a->output, "Folder for the results (default: out/RECIPE)");
+  verb->callback([&context, a] {
+    if (a->name.empty() && !a->all) {
+      throw Error(ExitCode::usage, "refit what?", "refit", "name a recipe, or use --all");
+    }
+    if (!a->all) {
+      run(a->name, a->output, context);
+      return;
+    }
+    for (const std::string& recipe : shipped_recipes()) {
+      run(recipe, a->output.empty() ? "" : (fs::path(a->output) / recipe).string(), context);
+    }
+  });
+}
+
+}  // namespace lobefit

@@ -1,0 +1,137 @@
+// lobefit table: what is in a table, and how far two are apart.
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "cli/arguments.h"
+#include "cli/slice.h"
+#include "reference/metric.h"
+#include "report/image.h"
+
+namespace lobefit {
+
+namespace {
+
+void add_info(CLI::App& tables, Context& context) {
+  CLI::App* verb = tables.add_subcommand("info", "Axes, channels, entries and provenance");
+  const auto name = std::make_shared<std::string>();
+  verb->add_option("TABLE", *name, "Table file")->required();
+  verb->callback([&context, name] {
+    const Table table = Table::read(*name);
+    const Json description = table.describe();
+    if (context.json) {
+      std::cout << description.dump(2) << "\n";
+      return;
+    }
+    for (const Json& axis : description["axes"]) {
+      const auto values = axis["values"].get<std::vector<double>>();
+      fmt::print("  {:<10} {:>4} {} from {:g} to {:g} {}\n", axis["name"].get<std::string>(), values.size(),
+                 axis["kind"].get<std::string>(), values.front(), values.back(), axis["unit"].get<std::string>());
+    }
+    fmt::print("  {} entries, {} masked, {} channel{}, {} replicates\n", table.entries(), table.masked(), table.channels,
+               table.channels == 1 ? "" : "s", description["replicates"].get<int>());
+    for (const auto& [key, value] : description["provenance"].items()) {
+      fmt::print("  {:<14} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  });
+}
+
+void add_slice(CLI::App& tables, Context& context) {
+  CLI::App* verb = tables.add_subcommand(
+      "slice",
+      "Part of a table as CSV, or as a false-colour picture of two axes\n"
+      "  lobefit table slice truth.exr --at alpha=0.5 --at theta_o=60 --at phi=0\n"
+      "  lobefit table slice truth.exr --at alpha=0.5 --at phi=180 -o slice.png");
+  struct Arguments {
+    std::string name, output;
+    std::vector<std::string> at;
+  };
+  const auto a = std::make_shared<Arguments>();
+  verb->add_option("TABLE", a->name, "Table file")->required();
+  add_repeatable(*verb, "--at", a->at, "AXIS=VALUE holds an axis at one of its values (repeatable)");
+  verb->add_option("-o,--output", a->output, "File to write, .csv or .png (default: CSV on stdout)");
+  verb->callback([&context, a] {
+    const Table table = Table::read(a->name);
+    const Slice slice = cut(table, a->at);
+    if (!a->output.ends_with(".png")) {
+      write_or_print(slice.csv(), a->output, context.force);
+      return;
+    }
+    if (slice.axes.size() != 2) {
+      throw Error(ExitCode::usage, fmt::format("a picture shows two axes, {} are left", slice.axes.size()), "table slice",
+                  "hold the others with --at AXIS=VALUE");
+    }
+    write_false_colour(slice.cosine_picture(), slice.axes[1].size(), slice.axes[0].size(), a->output, context.force);
+  });
+}
+
+void add_compare(CLI::App& tables, Context& context) {
+  CLI::App* verb = tables.add_subcommand(
+      "compare",
+      "How far a second table, a model or a fit is from a table, in every metric\n"
+      "  lobefit table compare truth.exr other.exr --tolerance 1e-4\n"
+      "  lobefit table compare truth.exr chan_2024 --set multiple_scattering=0");
+  struct Arguments {
+    std::string first, second, weights = "uniform", metric = "cosine";
+    std::vector<std::string> settings, mappings;
+    double tolerance = 0.0;
+  };
+  const auto a = std::make_shared<Arguments>();
+  verb->add_option("A", a->first, "Table file")->required();
+  verb->add_option("B", a->second, "Table file on the same grid, model, or fit (JSON)")->required();
+  add_repeatable(*verb, "--set", a->settings, "NAME=VALUE of the model (repeatable)");
+  add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER of the model (repeatable)");
+  verb->add_option("--weights", a->weights,
+                   "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
+      ->capture_default_str();
+  verb->add_option("--metric", a->metric, "Metric that --tolerance bounds: cosine, brdf, log, cube_root")->capture_default_str();
+  auto* tolerance = verb->add_option("--tolerance", a->tolerance, "Exit with 5 if the metric is larger");
+  verb->callback([&context, a, tolerance] {
+    const Table table = Table::read(a->first);
+    const Quantity bounded = parse_quantity(a->metric);
+    std::vector<float> values;
+    if (is_file(a->second) && !a->second.ends_with(".json")) {
+      const Table other = Table::read(a->second);
+      if (other.describe()["axes"] != table.describe()["axes"] || other.channels != table.channels) {
+        throw Error(ExitCode::invalid_input, "the tables have different axes", a->second,
+                    "render both over the same grid; `lobefit table info` shows it");
+      }
+      values = other.values;
+    } else {
+      const ModelChoice choice = choose_for_table(a->second, a->settings, a->mappings, table);
+      values = TableModel(*choice.model, choice.values, table, choice.mappings).render().values;
+    }
+    Json metrics = Json::object();
+    double found = 0.0;
+    for (std::size_t q = 0; q < quantity_names.size(); ++q) {
+      const auto quantity = static_cast<Quantity>(q);
+      const double rms = rms_difference(table, values, quantity, entry_weights(table, parse_weights(a->weights), quantity));
+      metrics[std::string(quantity_names[q])] = rms;
+      if (quantity == bounded) found = rms;
+    }
+    const bool passed = tolerance->count() == 0 || found <= a->tolerance;
+    if (context.json) {
+      std::cout << Json{{"a", a->first}, {"b", a->second}, {"weights", a->weights}, {"rms", metrics}, {"passed", passed}}.dump(2)
+                << "\n";
+    } else {
+      for (const auto& [name, value] : metrics.items()) fmt::print("  rms {:<10} {:.6g}\n", name, value.get<double>());
+    }
+    if (!passed) {
+      throw Error(ExitCode::check_failed, fmt::format("rms {} {:.6g} exceeds {:g}", a->metric, found, a->tolerance),
+                  a->second, "raise --tolerance only if the difference is meant");
+    }
+  });
+}
+
+}  // namespace
+
+void add_table(CLI::App& app, Context& context) {
+  CLI::App* verb = app.add_subcommand("table", "Look into tables: info, slice, compare");
+  verb->require_subcommand(1);
+  add_info(*verb, context);
+  add_slice(*verb, context);
+  add_compare(*verb, context);
+  for (CLI::App* part : verb->get_subcommands([](const CLI::App*) { return true; })) part->fallthrough();
+}
+
+}  // namespace lobefit

@@ -1,0 +1,270 @@
+// The command line as scripts see it: exit codes, messages, files, JSON.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+struct Outcome {
+  int code;
+  std::string out, err;
+};
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// A folder of its own for each test, and the program run in it.
+class CommandLine : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) / ("lobefit_cli_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override {
+    fs::permissions(folder_, fs::perms::owner_all);
+    fs::remove_all(folder_);
+  }
+
+  Outcome run(const std::string& arguments) const {
+    const std::string command = "cd '" + folder_.string() + "' && '" LOBEFIT_PROGRAM "' " + arguments + " >.out 2>.err";
+    const int status = std::system(command.c_str());
+    const Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder_ / ".out"), content(folder_ / ".err")};
+    fs::remove(folder_ / ".out");
+    fs::remove(folder_ / ".err");
+    return outcome;
+  }
+  Json json(const std::string& arguments) const {
+    const Outcome outcome = run(arguments + " --json");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return Json::parse(outcome.out);
+  }
+  /// One line on stderr that holds every fragment, nothing on stdout, and no new file.
+  void expect_refused(const std::string& arguments, int code, std::initializer_list<const char*> fragments) const {
+    const auto before = files();
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.err;
+    EXPECT_EQ(outcome.out, "") << arguments;
+    EXPECT_TRUE(outcome.err.starts_with("lobefit: error: ")) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    for (const char* fragment : fragments) EXPECT_NE(outcome.err.find(fragment), std::string::npos) << outcome.err;
+    EXPECT_EQ(files(), before) << arguments;
+  }
+  std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& file : fs::directory_iterator(folder_)) names.push_back(file.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(CommandLine, WrongNamesOfferTheNearest) {
+  expect_refused("evl", 2, {"evl", "eval"});
+  expect_refused("eval proxmia --wi 0,0 --wo 0,0", 2, {"proxmia", "'proxima'"});
+  expect_refused("eval proxima --set alhpa=0.5 --wi 0,0 --wo 0,0", 2, {"alhpa", "'alpha'"});
+  expect_refused("reference microfacet_difuse --wi 0,0 --wo 0,0", 2, {"'microfacet_diffuse'"});
+  expect_refused("refit proxma", 2, {"'proxima'"});
+  expect_refused("eval proxima --bogus", 2, {"--bogus", "--help"});
+}
+
+TEST_F(CommandLine, ValuesOutOfRangeNameTheRange) {
+  expect_refused("eval proxima --set alpha=1.5 --wi 0,0 --wo 0,0", 2, {"1.5", "alpha", "from 0 to 1"});
+  expect_refused("eval proxima --set alpha=-0.1 --wi 0,0 --wo 0,0", 2, {"from 0 to 1"});
+  expect_refused("eval proxima --set alpha=nan --wi 0,0 --wo 0,0", 2, {"not a finite number"});
+  expect_refused("eval proxima --set albedo=inf --wi 0,0 --wo 0,0", 2, {"not a finite number"});
+  expect_refused("eval proxima --set albedo=0.1,0.2 --wi 0,0 --wo 0,0", 2, {"albedo", "three"});
+  expect_refused("eval proxima --wi 90,0 --wo 0,0", 2, {"--wi", "below 90"});
+  expect_refused("eval proxima --wi 10,0 --wo 120,0", 2, {"--wo", "below 90"});
+  expect_refused("eval proxima --wi nan,0 --wo 0,0", 2, {"not a finite number"});
+  expect_refused("eval proxima --wi 1e999,0 --wo 0,0", 2, {"not a finite number"});
+  expect_refused("reference microfacet_diffuse --set masking=smith --wi 0,0 --wo 0,0", 2, {"smith", "correlated"});
+  expect_refused("render microfacet_diffuse --axis alpha=0.5,2 -o t.exr", 2, {"2", "from 0.001 to 1"});
+  expect_refused("render microfacet_diffuse --axis masking=1 -o t.exr", 2, {"masking", "axis"});
+}
+
+TEST_F(CommandLine, OutputsAreWholeOrAbsent) {
+  expect_refused("render microfacet_diffuse --grid small -o missing/t.exr", 1, {"missing/t.exr", "No such file"});
+  ASSERT_EQ(run("render microfacet_diffuse --grid small --samples 64 -o t.exr").code, 0);
+  const std::string first = content(folder_ / "t.exr");
+  expect_refused("render microfacet_diffuse --grid small --samples 128 -o t.exr", 2, {"t.exr", "--force"});
+  EXPECT_EQ(content(folder_ / "t.exr"), first);
+  EXPECT_EQ(run("render microfacet_diffuse --grid small --samples 128 -o t.exr --force").code, 0);
+  EXPECT_NE(content(folder_ / "t.exr"), first);
+  EXPECT_EQ(files(), std::vector<std::string>{"t.exr"});
+}
+
+TEST_F(CommandLine, UnreadableTablesAreRefused) {
+  ASSERT_EQ(run("render microfacet_diffuse --grid small --samples 64 -o t.exr").code, 0);
+  const std::string whole = content(folder_ / "t.exr");
+  std::ofstream(folder_ / "cut.exr", std::ios::binary) << whole.substr(0, whole.size() / 2);
+  std::ofstream(folder_ / "text.exr") << "not a picture";
+  std::ofstream(folder_ / "empty.exr");
+  for (const char* name : {"cut.exr", "text.exr", "empty.exr", "absent.exr"}) {
+    expect_refused(std::string("table info ") + name, 3, {name});
+    expect_refused(std::string("fit proxima ") + name + " --free a -o fit.json", 3, {name});
+  }
+}
+
+TEST_F(CommandLine, CtrlCLeavesNothingBroken) {
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    if (chdir(folder_.c_str()) != 0) _exit(127);
+    // Hours of work, so that the signal surely comes in the middle.
+    execl(LOBEFIT_PROGRAM, "lobefit", "render", "microfacet_diffuse", "--samples", "100000000", "-o", "long.exr",
+          "--quiet", static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  // The probe for writing shows that the work is about to begin.
+  for (int i = 0; i < 500 && files().empty(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_FALSE(files().empty());
+  kill(child, SIGINT);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_TRUE(files().empty());
+}
+
+TEST_F(CommandLine, ThreadsDoNotChangeTheBits) {
+  const std::string render = "render microfacet_diffuse --grid small --samples 512 --axis alpha=0.2,0.7 ";
+  ASSERT_EQ(run(render + "--threads 1 -o one.exr").code, 0);
+  ASSERT_EQ(run(render + "--threads 2 -o two.exr").code, 0);
+  EXPECT_EQ(content(folder_ / "one.exr"), content(folder_ / "two.exr"));
+  ASSERT_EQ(run("fit proxima one.exr --free a,b --threads 1 -o one.json").code, 0);
+  ASSERT_EQ(run("fit proxima one.exr --free a,b --threads 2 -o two.json").code, 0);
+  EXPECT_EQ(content(folder_ / "one.json"), content(folder_ / "two.json"));
+  ASSERT_EQ(run("render microfacet_diffuse --grid small --samples 512 --seed 2 -o other.exr").code, 0);
+  EXPECT_NE(content(folder_ / "one.exr"), content(folder_ / "other.exr"));
+}
+
+TEST_F(CommandLine, EvalAnswersPairsAndFiles) {
+  const Json answer = json("eval lambert --set albedo=0.8,0.4,0.2 --wi 30,0 --wo 60,90");
+  EXPECT_EQ(answer["model"], "lambert");
+  EXPECT_EQ(answer["params"]["albedo"], (Json{0.8, 0.4, 0.2}));
+  ASSERT_EQ(answer["values"].size(), 1u);
+  EXPECT_EQ(answer["values"][0]["wi"], (Json{30.0, 0.0}));
+  const double inverse_pi = 0.31830988618379067;
+  const double albedo[] = {0.8, 0.4, 0.2};
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(answer["values"][0]["f"][c], albedo[c] * inverse_pi, 1e-15);
+
+  std::ofstream(folder_ / "pairs.csv") << "name,theta_i,phi_i,theta_o,phi_o\nfirst,10,0,20,0\nsecond,30,0,40,180\n";
+  const Outcome csv = run("eval lambert --csv pairs.csv");
+  EXPECT_EQ(csv.code, 0) << csv.err;
+  EXPECT_TRUE(csv.out.starts_with("name,theta_i,phi_i,theta_o,phi_o,r,g,b\nfirst,10,0,20,0,0.31830988618379")) << csv.out;
+  std::ofstream(folder_ / "bad.csv") << "theta_i,phi_i,theta_o,phi_o\n10,0,20,0\n10,0,95,0\n";
+  const Outcome bad = run("eval lambert --csv bad.csv");
+  EXPECT_EQ(bad.code, 3);
+  EXPECT_NE(bad.err.find("bad.csv, line 3"), std::string::npos) << bad.err;
+  std::ofstream(folder_ / "nan.csv") << "theta_i,phi_i,theta_o,phi_o\nnan,0,20,0\n";
+  EXPECT_EQ(run("eval lambert --csv nan.csv").code, 3);
+  EXPECT_EQ(run("eval lambert --csv absent.csv").code, 3);
+}
+
+TEST_F(CommandLine, ReferenceMeetsPublishedValues) {
+  // formulas.md, section 3: alpha = ½, GGX, height-correlated, one bounce, per unit albedo.
+  const std::string at = "reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --exact --wo ";
+  EXPECT_NEAR(json(at + "60,0")["f"][0], 0.361554992058, 5e-13);
+  EXPECT_NEAR(json(at + "60,180")["f"][0], 0.127865601469, 5e-13);
+  const Json sampled = json("reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --wo 60,180 --samples 65536");
+  EXPECT_EQ(sampled["method"], "monte_carlo");
+  EXPECT_EQ(sampled["samples"], 65536);
+  const double error = sampled["stderr"][0];
+  EXPECT_GT(error, 0.0);
+  // Four standard errors with 31 degrees of freedom: a false alarm in 2700 seeds; the seed is fixed.
+  EXPECT_NEAR(sampled["f"][0], 0.127865601469, 4.0 * error);
+}
+
+TEST_F(CommandLine, FitCheckExportHangTogether) {
+  ASSERT_EQ(run("render proxima --set a=-0.4 --set b=0.11 --axis alpha=0.3,0.9 --grid small -o t.exr").code, 0);
+  ASSERT_EQ(run("fit proxima t.exr --free a,b --metric cosine -o fit.json").code, 0);
+  const Json fit = Json::parse(content(folder_ / "fit.json"));
+  EXPECT_EQ(fit["model"], "proxima");
+  EXPECT_TRUE(fit["identifiable"]);
+  for (const Json& parameter : fit["params"]) {
+    if (parameter["name"] == "a") EXPECT_NEAR(parameter["value"], -0.4, 1e-6);
+    if (parameter["name"] == "b") EXPECT_NEAR(parameter["value"], 0.11, 1e-6);
+  }
+  EXPECT_EQ(fit["provenance"]["table_sha256"].get<std::string>().size(), 64u);
+  EXPECT_EQ(fit["provenance"]["command"], "lobefit fit proxima t.exr --free a,b --metric cosine");
+
+  const Json check = json("check fit.json --table t.exr --pairs 65536");
+  EXPECT_TRUE(check["passed"]);
+  EXPECT_GT(check["max_abs"], 0.0);  // float is not double
+  EXPECT_LT(check["table"]["rms_float"], 1e-6);
+  const Outcome shader = run("export fit.json --lang hlsl");
+  EXPECT_EQ(shader.code, 0);
+  EXPECT_NE(shader.out.find("float3 Lobefit_proxima(float3 wi, float3 wo, Lobefit_proxima_Parameters p)"), std::string::npos);
+  EXPECT_NE(shader.out.find("Lobefit_proxima_Fitted()"), std::string::npos);
+  EXPECT_NE(shader.out.find("p.b = 0.11"), std::string::npos) << shader.out;
+  expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl"});
+  expect_refused("check fit.json --device vulkan", 6, {"Vulkan"});
+}
+
+TEST_F(CommandLine, ParametersWithoutEffectAreNamedNotReported) {
+  std::ofstream(folder_ / "slice.json") << R"({"theta_i":[0,20,40,60,80],"theta_o":[0],"phi":[0]})";
+  ASSERT_EQ(run("render microfacet_diffuse --grid slice.json --axis alpha=0.3,0.9 --exact -o t.exr").code, 0);
+  const Json fit = json("fit proxima t.exr --free a,b,exponent --metric cosine");
+  EXPECT_FALSE(fit["identifiable"]);
+  EXPECT_NE(fit["remarks"].dump().find("exponent has no effect"), std::string::npos) << fit["remarks"];
+}
+
+TEST_F(CommandLine, CompareExitsWithFiveBeyondTheTolerance) {
+  ASSERT_EQ(run("render lambert --grid small -o a.exr").code, 0);
+  ASSERT_EQ(run("render lambert --set albedo=0.9 --grid small -o b.exr").code, 0);
+  // π f cos θ differs by 0.1 cos θ: the mean square of the cosine over 0, 10, …, 80° is known.
+  double squares = 0.0;
+  for (int i = 0; i < 9; ++i) squares += std::pow(0.1 * std::cos(i * 10.0 * 0.017453292519943295), 2) / 9.0;
+  EXPECT_NEAR(json("table compare a.exr b.exr")["rms"]["cosine"], std::sqrt(squares), 1e-7);
+  EXPECT_EQ(run("table compare a.exr b.exr --tolerance 0.2").code, 0);
+  EXPECT_EQ(run("table compare a.exr b.exr --tolerance 0.01").code, 5);
+  ASSERT_EQ(run("render lambert --grid default -o c.exr").code, 0);
+  expect_refused("table compare a.exr c.exr", 3, {"axes"});
+}
+
+TEST_F(CommandLine, ModelsDescribeThemselves) {
+  const Json all = json("models")["models"];
+  EXPECT_GE(all.size(), 8u);
+  for (const Json& model : all) {
+    for (const char* key : {"name", "kind", "params", "source", "properties", "operations"}) EXPECT_TRUE(model.contains(key)) << model;
+    for (const Json& parameter : model["params"]) {
+      EXPECT_FALSE(parameter["doc"].get<std::string>().empty()) << parameter;
+      EXPECT_LE(parameter["range"][0], parameter["default"]) << parameter;
+      EXPECT_LE(parameter["default"], parameter["range"][1]) << parameter;
+    }
+  }
+  for (const char* verb : {"models", "eval", "albedo", "references", "reference", "render", "table", "fit", "refit", "check", "export", "plot"}) {
+    const Outcome help = run(std::string(verb) + " --help");
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find(verb), std::string::npos);
+  }
+}
+
+TEST_F(CommandLine, ReadingAnUnfinishedRecipeNamesTheJsonPath) {
+  std::ofstream(folder_ / "r.json") << R"({"recipe":"r","title":"t","description":"d","model":"proxima","published":{"a":-0.5},
+    "axes":{"alpha":[0.5]},"tolerance":0.01,"rows":[{"name":"n","views":"all","reference":{"name":"microfacet_diffuse"},
+    "grid":"small","metric":"cosine","weights":"uniform","free":[["a","gamma"]]}]})";
+  expect_refused("refit r.json -o out", 3, {"r.json", "$.rows[0].free[0][1]", "gamma"});
+  std::ofstream(folder_ / "s.json") << "{\"recipe\": ";
+  expect_refused("refit s.json -o out", 3, {"s.json, line 1"});
+}
+
+}  // namespace

@@ -1,0 +1,327 @@
+// Two ways to run a shader on the CPU in double: from its graph, and from its printed text.
+//
+// They share nothing but the meaning of the intrinsics, so text that reads differently than its graph shows up.
+#pragma once
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "evaluate/expression.h"
+
+namespace lobefit {
+
+/// One or three components; a boolean is 0 or 1.
+using ShaderValue = std::vector<double>;
+
+/// Applies f to each component; a scalar goes with every component of a vector.
+template <class F>
+ShaderValue by_component(const ShaderValue& a, const ShaderValue& b, F&& f) {
+  ShaderValue result(std::max(a.size(), b.size()));
+  for (std::size_t k = 0; k < result.size(); ++k) result[k] = f(a[a.size() == 1 ? 0 : k], b[b.size() == 1 ? 0 : k]);
+  return result;
+}
+
+inline ShaderValue run_intrinsic(std::string_view name, const std::vector<ShaderValue>& x) {
+  const auto one = [&](double (*f)(double)) {
+    return by_component(x.at(0), {0.0}, [&](double a, double) { return f(a); });
+  };
+  const auto two = [&](double (*f)(double, double)) { return by_component(x.at(0), x.at(1), f); };
+  const auto dot = [](const ShaderValue& a, const ShaderValue& b) {
+    return a.at(0) * b.at(0) + a.at(1) * b.at(1) + a.at(2) * b.at(2);
+  };
+  if (name == "min") return two([](double a, double b) { return a < b ? a : b; });
+  if (name == "max") return two([](double a, double b) { return a > b ? a : b; });
+  if (name == "abs") return one([](double a) { return std::fabs(a); });
+  if (name == "sqrt") return one([](double a) { return std::sqrt(a); });
+  if (name == "exp") return one([](double a) { return std::exp(a); });
+  if (name == "exp2") return one([](double a) { return std::exp2(a); });
+  if (name == "log") return one([](double a) { return std::log(a); });
+  if (name == "log2") return one([](double a) { return std::log2(a); });
+  if (name == "pow") return two([](double a, double b) { return std::pow(a, b); });
+  if (name == "saturate") return one([](double a) { return std::min(std::max(a, 0.0), 1.0); });
+  if (name == "clamp") {
+    const ShaderValue raised = by_component(x.at(0), x.at(1), [](double a, double b) { return std::max(a, b); });
+    return by_component(raised, x.at(2), [](double a, double b) { return std::min(a, b); });
+  }
+  if (name == "lerp" || name == "mix") {
+    const ShaderValue span = by_component(x.at(1), x.at(0), [](double b, double a) { return b - a; });
+    const ShaderValue part = by_component(span, x.at(2), [](double a, double b) { return a * b; });
+    return by_component(x.at(0), part, [](double a, double b) { return a + b; });
+  }
+  if (name == "dot") return {dot(x.at(0), x.at(1))};
+  if (name == "normalize")
+    return by_component(x.at(0), {std::sqrt(dot(x.at(0), x.at(0)))}, [](double a, double b) { return a / b; });
+  throw std::runtime_error("no intrinsic " + std::string(name));
+}
+
+/// Walks a shader's nodes.
+class GraphInterpreter {
+ public:
+  explicit GraphInterpreter(const Shader& shader) : shader_(shader) {}
+
+  /// `inputs` by name: wi, wo, p.alpha, …
+  ShaderValue run(const std::map<std::string, ShaderValue>& inputs) const { return run(shader_.brdf, inputs); }
+
+ private:
+  ShaderValue run(const ShaderFunction& function, const std::map<std::string, ShaderValue>& inputs) const {
+    std::map<const ShaderNode*, ShaderValue> known;
+    return value(*function.result, inputs, known);
+  }
+
+  ShaderValue value(const ShaderNode& node, const std::map<std::string, ShaderValue>& inputs,
+                    std::map<const ShaderNode*, ShaderValue>& known) const {
+    const auto found = known.find(&node);
+    if (found != known.end()) return found->second;
+    std::vector<ShaderValue> x;
+    for (const ShaderNode* operand : node.operands) x.push_back(value(*operand, inputs, known));
+    const ShaderValue result = apply(node, x, inputs);
+    if (result.size() != (node.type == ShaderType::vector ? 3u : 1u)) throw std::runtime_error("type of a node");
+    return known[&node] = result;
+  }
+
+  ShaderValue apply(const ShaderNode& node, const std::vector<ShaderValue>& x,
+                    const std::map<std::string, ShaderValue>& inputs) const {
+    switch (node.operation) {
+      case Operation::literal: return {node.literal};
+      case Operation::input: return inputs.at(node.name);
+      case Operation::component: return {x[0].at(static_cast<std::size_t>(node.name[0] - 'x'))};
+      case Operation::let: return x[0];
+      case Operation::construct: return {x[0].at(0), x[1].at(0), x[2].at(0)};
+      case Operation::add: return by_component(x[0], x[1], [](double a, double b) { return a + b; });
+      case Operation::subtract: return by_component(x[0], x[1], [](double a, double b) { return a - b; });
+      case Operation::multiply: return by_component(x[0], x[1], [](double a, double b) { return a * b; });
+      case Operation::divide: return by_component(x[0], x[1], [](double a, double b) { return a / b; });
+      case Operation::negate: return by_component(x[0], {0.0}, [](double a, double) { return -a; });
+      case Operation::less: return {x[0][0] < x[1][0] ? 1.0 : 0.0};
+      case Operation::greater: return {x[0][0] > x[1][0] ? 1.0 : 0.0};
+      case Operation::less_equal: return {x[0][0] <= x[1][0] ? 1.0 : 0.0};
+      case Operation::greater_equal: return {x[0][0] >= x[1][0] ? 1.0 : 0.0};
+      case Operation::select: return x[0][0] != 0.0 ? x[1] : x[2];
+      case Operation::intrinsic: return run_intrinsic(node.name, x);
+      case Operation::call: {
+        const auto function = std::find_if(shader_.functions.begin(), shader_.functions.end(),
+                                           [&](const ShaderFunction& f) { return f.name == node.name; });
+        if (function == shader_.functions.end()) throw std::runtime_error("no function " + node.name);
+        std::map<std::string, ShaderValue> arguments;
+        for (std::size_t k = 0; k < x.size(); ++k) arguments[function->arguments.at(k).name] = x[k];
+        return run(*function, arguments);
+      }
+    }
+    throw std::runtime_error("unknown operation");
+  }
+
+  const Shader& shader_;
+};
+
+/// Reads the subset of HLSL and GLSL that lobefit prints, by the grammar of C: ?: comparison sum product unary postfix.
+class TextInterpreter {
+ public:
+  using Variables = std::map<std::string, ShaderValue>;
+
+  explicit TextInterpreter(std::string_view text) {
+    split(text);
+    while (at_ < tokens_.size()) {
+      if (accept("struct")) {
+        while (!accept("}")) ++at_;
+        expect(";");
+        continue;
+      }
+      ++at_;  // the result's type
+      Function& function = functions_[next()];
+      expect("(");
+      while (!accept(")")) {
+        accept(",");
+        ++at_;  // the argument's type
+        function.arguments.push_back(next());
+      }
+      expect("{");
+      function.begin = at_;
+      while (!accept("}")) ++at_;
+    }
+  }
+
+  /// Calls a function; a struct p is passed as its members `p.alpha`, … in `more`.
+  ShaderValue call(const std::string& name, const std::vector<ShaderValue>& arguments, const Variables& more = {}) {
+    Variables variables = more;
+    const Function& function = functions_.at(name);
+    for (std::size_t k = 0; k < arguments.size(); ++k) variables[function.arguments.at(k)] = arguments[k];
+    return run(function, variables);
+  }
+
+  /// The members that a function without arguments gives to the struct it returns.
+  Variables members(const std::string& name) {
+    Variables variables;
+    run(functions_.at(name), variables);
+    return variables;
+  }
+
+ private:
+  struct Function {
+    std::vector<std::string> arguments;
+    std::size_t begin = 0;
+  };
+
+  void split(std::string_view text) {
+    for (std::size_t i = 0; i < text.size();) {
+      const auto is_word = [&](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+      std::size_t end = i + 1;
+      if (std::isspace(static_cast<unsigned char>(text[i]))) {
+        i = end;
+        continue;
+      }
+      if (text[i] == '#' || text.substr(i, 2) == "//") {
+        i = text.find('\n', i);
+        continue;
+      }
+      if (std::isdigit(static_cast<unsigned char>(text[i]))) {
+        while (end < text.size() && (is_word(text[end]) || text[end] == '.' ||
+                                     (text[end - 1] == 'e' && (text[end] == '-' || text[end] == '+')))) {
+          ++end;
+        }
+      } else if (is_word(text[i])) {
+        while (end < text.size() && is_word(text[end])) ++end;
+      } else if (text.substr(i, 2) == "<=" || text.substr(i, 2) == ">=") {
+        ++end;
+      }
+      tokens_.emplace_back(text.substr(i, end - i));
+      i = end;
+    }
+  }
+
+  std::string next() { return tokens_.at(at_++); }
+  bool accept(std::string_view token) {
+    if (tokens_.at(at_) != token) return false;
+    ++at_;
+    return true;
+  }
+  void expect(std::string_view token) {
+    if (!accept(token)) throw std::runtime_error("expected " + std::string(token) + ", found " + tokens_.at(at_));
+  }
+
+  ShaderValue run(const Function& function, Variables& variables) {
+    const std::size_t caller = at_;
+    at_ = function.begin;
+    while (!accept("return")) {
+      std::string name = next();
+      if (accept(".")) {
+        name += "." + next();  // p.alpha = …;
+      } else {
+        name = next();  // type name = …; or type name;
+        if (variables.contains(name)) throw std::runtime_error(name + " is defined twice");
+        if (accept(";")) continue;
+      }
+      expect("=");
+      variables[name] = ternary(variables);
+      expect(";");
+    }
+    ShaderValue result;
+    if (tokens_.at(at_) == "p" && tokens_.at(at_ + 1) == ";") {
+      at_ += 2;  // return p;
+    } else {
+      result = ternary(variables);
+      expect(";");
+    }
+    at_ = caller;
+    return result;
+  }
+
+  ShaderValue ternary(const Variables& variables) {
+    const ShaderValue condition = comparison(variables);
+    if (!accept("?")) return condition;
+    const ShaderValue yes = ternary(variables);
+    expect(":");
+    const ShaderValue no = ternary(variables);
+    return condition.at(0) != 0.0 ? yes : no;
+  }
+
+  ShaderValue comparison(const Variables& variables) {
+    ShaderValue value = sum(variables);
+    while (true) {
+      const double a = value.at(0);
+      if (accept("<"))
+        value = {a < sum(variables).at(0) ? 1.0 : 0.0};
+      else if (accept(">"))
+        value = {a > sum(variables).at(0) ? 1.0 : 0.0};
+      else if (accept("<="))
+        value = {a <= sum(variables).at(0) ? 1.0 : 0.0};
+      else if (accept(">="))
+        value = {a >= sum(variables).at(0) ? 1.0 : 0.0};
+      else
+        return value;
+    }
+  }
+
+  ShaderValue sum(const Variables& variables) {
+    ShaderValue value = product(variables);
+    while (true) {
+      if (accept("+"))
+        value = by_component(value, product(variables), [](double a, double b) { return a + b; });
+      else if (accept("-"))
+        value = by_component(value, product(variables), [](double a, double b) { return a - b; });
+      else
+        return value;
+    }
+  }
+
+  ShaderValue product(const Variables& variables) {
+    ShaderValue value = unary(variables);
+    while (true) {
+      if (accept("*"))
+        value = by_component(value, unary(variables), [](double a, double b) { return a * b; });
+      else if (accept("/"))
+        value = by_component(value, unary(variables), [](double a, double b) { return a / b; });
+      else
+        return value;
+    }
+  }
+
+  ShaderValue unary(const Variables& variables) {
+    if (accept("-")) return by_component(unary(variables), {0.0}, [](double a, double) { return -a; });
+    ShaderValue value = primary(variables);
+    while (accept(".")) value = {value.at(static_cast<std::size_t>(next()[0] - 'x'))};
+    return value;
+  }
+
+  ShaderValue primary(const Variables& variables) {
+    if (accept("(")) {
+      const ShaderValue value = ternary(variables);
+      expect(")");
+      return value;
+    }
+    const std::string token = next();
+    if (std::isdigit(static_cast<unsigned char>(token[0]))) {
+      std::size_t length = 0;
+      const double value = std::stod(token, &length);
+      if (length != token.size()) throw std::runtime_error("not a number: " + token);
+      return {value};
+    }
+    if (token == "LOBEFIT_PI") return {pi};
+    if (accept("(")) {
+      std::vector<ShaderValue> arguments;
+      while (!accept(")")) {
+        accept(",");
+        arguments.push_back(ternary(variables));
+      }
+      if (token == "float3" || token == "vec3")
+        return {arguments.at(0).at(0), arguments.at(1).at(0), arguments.at(2).at(0)};
+      return functions_.contains(token) ? call(token, arguments) : run_intrinsic(token, arguments);
+    }
+    if (tokens_.at(at_) == "." && variables.contains(token + "." + tokens_.at(at_ + 1))) {
+      ++at_;
+      return variables.at(token + "." + next());
+    }
+    return variables.at(token);
+  }
+
+  std::vector<std::string> tokens_;
+  std::size_t at_ = 0;
+  std::map<std::string, Function> functions_;
+};
+
+}  // namespace lobefit
