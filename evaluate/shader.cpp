@@ -48,7 +48,8 @@ const std::set<std::string>& reserved_names() {
       "p",      "half",   "double",  "sample", "smooth", "flat",   "shared", "input",   "output", "common", "partition",
       "active", "filter", "texture", "point",  "line",   "linear", "matrix", "vector",  "min",    "max",    "abs",
       "clamp",  "lerp",   "mix",     "sqrt",   "exp",    "exp2",   "log",    "log2",    "pow",    "dot",    "normalize",
-      "cross",  "length", "step",    "fract",  "sign",   "mod",    "out",    "in",      "inout",  "discard"};
+      "cross",  "length", "step",    "fract",  "sign",   "mod",    "out",    "in",      "inout",  "discard",
+      "saturate"};
   return names;
 }
 

@@ -31,11 +31,17 @@ class Single {
   LOBEFIT_TEXT friend constexpr bool operator<=(Single a, Single b) { return a.value <= b.value; }
   LOBEFIT_TEXT friend constexpr bool operator>=(Single a, Single b) { return a.value >= b.value; }
 
-  LOBEFIT_TEXT friend constexpr Single min(Single a, Single b) { return Single(a.value < b.value ? a.value : b.value); }
-  LOBEFIT_TEXT friend constexpr Single max(Single a, Single b) { return Single(a.value > b.value ? a.value : b.value); }
-  LOBEFIT_TEXT friend constexpr Single abs(Single x) { return Single(x.value < 0.0f ? -x.value : x.value); }
+  /// By masks, not ?:, which would become a branch: where the condition depends on parameters alone, GCC 12 moves it
+  /// out of the loop and then can't vectorise what is left.
   LOBEFIT_TEXT friend constexpr Single select(bool condition, Single a, Single b) {
-    return Single(condition ? a.value : b.value);
+    const std::uint32_t mask = -static_cast<std::uint32_t>(condition);
+    return Single(std::bit_cast<float>((std::bit_cast<std::uint32_t>(a.value) & mask) |
+                                       (std::bit_cast<std::uint32_t>(b.value) & ~mask)));
+  }
+  LOBEFIT_TEXT friend constexpr Single min(Single a, Single b) { return select(a < b, a, b); }
+  LOBEFIT_TEXT friend constexpr Single max(Single a, Single b) { return select(a > b, a, b); }
+  LOBEFIT_TEXT friend constexpr Single abs(Single x) {
+    return Single(std::bit_cast<float>(std::bit_cast<std::uint32_t>(x.value) & 0x7fffffffu));
   }
   LOBEFIT_TEXT friend Single sqrt(Single x) { return Single(__builtin_sqrtf(max(x, 0.0).value)); }
 

@@ -6,5 +6,5 @@
 #if defined(LOBEFIT_NO_CLONES)
 #define LOBEFIT_CLONES
 #else
-#define LOBEFIT_CLONES __attribute__((target_clones("avx512f", "avx2,fma", "default")))
+#define LOBEFIT_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
 #endif

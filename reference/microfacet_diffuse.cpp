@@ -62,24 +62,25 @@ double azimuth_mean(double run, double rise, const Direction& a, const Direction
 }
 
 constexpr std::uint32_t block = 256;  // facets summed in float before the sum moves to double
+constexpr std::uint32_t pack = 8;     // facets that pass while a sum is in its register; divides block
 
 /// sums[j] += Σ over facets of (m · wi_j)⁺. Lanes are directions; the order of facets is the order of additions.
-LOBEFIT_CLONES [[gnu::noinline]] void add_visible_cosines(const float* __restrict m, std::uint32_t facets,
+/// `facets` is a multiple of `pack`.
+LOBEFIT_CLONES [[gnu::noinline]] void add_visible_cosines(const float* __restrict mx, const float* __restrict my,
+                                                          const float* __restrict mz, std::uint32_t facets,
                                                           const float* __restrict x, const float* __restrict y,
                                                           const float* __restrict z, std::size_t n,
                                                           float* __restrict sums) {
-  // Sixteen directions stay in registers while all facets pass.
-  std::size_t j = 0;
-  for (; j + 16 <= n; j += 16) {
-    float sum[16] = {};
-    for (std::uint32_t k = 0; k < facets; ++k) {
-      const float mx = m[3 * k], my = m[3 * k + 1], mz = m[3 * k + 2];
-      for (std::size_t lane = 0; lane < 16; ++lane) {
-        const float cosine = mx * x[j + lane] + my * y[j + lane] + mz * z[j + lane];
-        sum[lane] += cosine > 0.0f ? cosine : 0.0f;
+  for (std::size_t first = 0; first < facets; first += pack) {
+    for (std::size_t j = 0; j < n; ++j) {
+      float sum = sums[j];
+#pragma GCC unroll 8
+      for (std::uint32_t k = 0; k < pack; ++k) {
+        const float cosine = mx[first + k] * x[j] + my[first + k] * y[j] + mz[first + k] * z[j];
+        sum += cosine > 0.0f ? cosine : 0.0f;
       }
+      sums[j] = sum;
     }
-    for (std::size_t lane = 0; lane < 16; ++lane) sums[j + lane] += sum[lane];
   }
 }
 
@@ -178,17 +179,20 @@ void MicrofacetDiffuseSurface::sample_row_fast(const Direction& wo, std::span<co
   for (std::size_t j = 0; j < wi.size(); ++j) {
     x[j] = static_cast<float>(wi[j].x), y[j] = static_cast<float>(wi[j].y), z[j] = static_cast<float>(wi[j].z);
   }
-  std::array<float, 3 * block> facets;
+  std::array<double, block> u, v;
+  std::array<float, block> mx, my, mz;
   for (std::uint32_t first = 0; first < samples; first += block) {
     const std::uint32_t count = std::min(block, samples - first);
-    for (std::uint32_t k = 0; k < count; ++k) {
-      const Direction m = sample_visible_normal(distribution_, alpha_, seen, points(first + k));
-      facets[3 * k] = static_cast<float>(m.x);
-      facets[3 * k + 1] = static_cast<float>(m.y);
-      facets[3 * k + 2] = static_cast<float>(m.z);
+    points.fill(first, std::span(u).first(count), std::span(v).first(count));
+    sample_visible_normals(distribution_, alpha_, seen, std::span(u).first(count), std::span(v).first(count),
+                           {mx, my, mz});
+    // A facet of zeros adds nothing.
+    const std::uint32_t whole = (count + pack - 1) / pack * pack;
+    for (std::array<float, block>* component : {&mx, &my, &mz}) {
+      std::fill(component->begin() + count, component->begin() + whole, 0.0f);
     }
     std::fill(sums.begin(), sums.end(), 0.0f);
-    add_visible_cosines(facets.data(), count, x.data(), y.data(), z.data(), padded, sums.data());
+    add_visible_cosines(mx.data(), my.data(), mz.data(), whole, x.data(), y.data(), z.data(), padded, sums.data());
     for (std::size_t j = 0; j < wi.size(); ++j) values[j] += sums[j];
   }
   for (std::size_t j = 0; j < wi.size(); ++j) values[j] *= weight(wi[j], wo) / samples;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 namespace lobefit {
 
@@ -39,6 +40,9 @@ class SamplePoints {
 
   /// Point number `index` < 2^32.
   std::array<double, 2> operator()(std::uint32_t index) const;
+
+  /// Points first, first + 1, …, one array per coordinate: the same numbers, Sobol's ten times as fast.
+  void fill(std::uint32_t first, std::span<double> u, std::span<double> v) const;
 
  private:
   std::array<std::uint32_t, 4> block(std::uint32_t index, std::uint32_t purpose) const;

@@ -2,23 +2,76 @@
 
 #include <boost/math/special_functions/erf.hpp>
 
+#include "models/instruction_sets.h"
+
 namespace lobefit {
 
 namespace {
 
-Direction sample_ggx(double alpha, const Direction& w, const std::array<double, 2>& u) {
+/// cos and sin of u turns, 0 ≤ u ≤ 1, by Taylor polynomials on |x| ≤ π/4: absolute error below 3e-16, and the same bits
+/// on every machine, vectorised or not.
+LOBEFIT_TEXT void cosine_and_sine_of_turns(double u, double& cosine, double& sine) {
+  const int quarter = static_cast<int>(4.0 * u + 0.5);
+  const double x = (u - 0.25 * quarter) * (2.0 * pi);
+  const double x2 = x * x;
+  double s = -1.0 / 1307674368000.0;
+  s = s * x2 + 1.0 / 6227020800.0;
+  s = s * x2 - 1.0 / 39916800.0;
+  s = s * x2 + 1.0 / 362880.0;
+  s = s * x2 - 1.0 / 5040.0;
+  s = s * x2 + 1.0 / 120.0;
+  s = s * x2 - 1.0 / 6.0;
+  s = x + x * x2 * s;
+  double c = 1.0 / 20922789888000.0;
+  c = c * x2 - 1.0 / 87178291200.0;
+  c = c * x2 + 1.0 / 479001600.0;
+  c = c * x2 - 1.0 / 3628800.0;
+  c = c * x2 + 1.0 / 40320.0;
+  c = c * x2 - 1.0 / 720.0;
+  c = c * x2 + 1.0 / 24.0;
+  c = c * x2 - 0.5;
+  c = 1.0 + x2 * c;
+  const bool odd = (quarter & 1) != 0;
+  const double a = odd ? s : c;
+  const double b = odd ? c : s;
+  cosine = ((quarter + 1) & 2) != 0 ? -a : a;
+  sine = (quarter & 2) != 0 ? -b : b;
+}
+
+/// What all GGX facets of one direction share.
+struct GgxView {
+  double alpha;
+  Direction stretched, t1, t2;
+};
+
+GgxView make_ggx_view(double alpha, const Direction& w) {
   const Direction stretched = normalize(Direction{alpha * w.x, alpha * w.y, w.z});
   const double across = std::hypot(stretched.x, stretched.y);
-  const Direction t1 = across > 0.0 ? Direction{-stretched.y / across, stretched.x / across, 0.0} : Direction{1.0, 0.0, 0.0};
-  const Direction t2 = cross(stretched, t1);
-  const double radius = std::sqrt(u[0]);
-  const double phi = 2.0 * pi * u[1];
-  const double p1 = radius * std::cos(phi);
+  const Direction t1 =
+      across > 0.0 ? Direction{-stretched.y / across, stretched.x / across, 0.0} : Direction{1.0, 0.0, 0.0};
+  return {alpha, stretched, t1, cross(stretched, t1)};
+}
+
+LOBEFIT_TEXT Direction sample_ggx(const GgxView& view, double u, double v) {
+  double cosine, sine;
+  cosine_and_sine_of_turns(v, cosine, sine);
+  const double radius = sqrt(u);
+  const double p1 = radius * cosine;
   // The half disk behind the direction is foreshortened: warp the second coordinate onto what is visible.
-  const double s = 0.5 * (1.0 + stretched.z);
-  const double p2 = (1.0 - s) * std::sqrt(1.0 - p1 * p1) + s * radius * std::sin(phi);
-  const Direction m = t1 * p1 + t2 * p2 + stretched * sqrt(1.0 - p1 * p1 - p2 * p2);
-  return normalize(Direction{alpha * m.x, alpha * m.y, max(m.z, 0.0)});
+  const double s = 0.5 * (1.0 + view.stretched.z);
+  const double p2 = (1.0 - s) * sqrt(1.0 - p1 * p1) + s * radius * sine;
+  const Direction m = view.t1 * p1 + view.t2 * p2 + view.stretched * sqrt(1.0 - p1 * p1 - p2 * p2);
+  return normalize(Direction{view.alpha * m.x, view.alpha * m.y, max(m.z, 0.0)});
+}
+
+LOBEFIT_CLONES [[gnu::noinline]] void fill_ggx(const GgxView& view, std::size_t n, const double* __restrict u,
+                                               const double* __restrict v, float* __restrict x, float* __restrict y,
+                                               float* __restrict z) {
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < n; ++i) {
+    const Direction m = sample_ggx(view, u[i], v[i]);
+    x[i] = static_cast<float>(m.x), y[i] = static_cast<float>(m.y), z[i] = static_cast<float>(m.z);
+  }
 }
 
 /// Slope x of a unit-roughness Beckmann surface as seen under `cosine`: density ∝ (cos - x sin)⁺ exp(-x²).
@@ -36,10 +89,10 @@ double sample_visible_beckmann_slope(double cosine, double sine, double u) {
     (excess > 0.0 ? high : low) = x;
     const double step = excess / ((cosine - x * sine) * std::exp(-x * x));
     const double next = x - step;
+    // Newton's error after a step this small is below rounding.
+    if (std::abs(step) < 1e-10) return next;
     // NaN and overshoots fall back to bisection.
-    const double moved = next > low && next < high ? next : 0.5 * (low + high);
-    if (std::abs(moved - x) < 1e-15) break;
-    x = moved;
+    x = next > low && next < high ? next : 0.5 * (low + high);
   }
   return x;
 }
@@ -60,7 +113,20 @@ Direction sample_beckmann(double alpha, const Direction& w, const std::array<dou
 
 Direction sample_visible_normal(Distribution distribution, double alpha, const Direction& w,
                                 const std::array<double, 2>& u) {
-  return distribution == Distribution::ggx ? sample_ggx(alpha, w, u) : sample_beckmann(alpha, w, u);
+  return distribution == Distribution::ggx ? sample_ggx(make_ggx_view(alpha, w), u[0], u[1])
+                                           : sample_beckmann(alpha, w, u);
+}
+
+void sample_visible_normals(Distribution distribution, double alpha, const Direction& w, std::span<const double> u,
+                            std::span<const double> v, const FacetBatch& facets) {
+  if (distribution == Distribution::ggx) {
+    return fill_ggx(make_ggx_view(alpha, w), u.size(), u.data(), v.data(), facets.x.data(), facets.y.data(),
+                    facets.z.data());
+  }
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    const Direction m = sample_beckmann(alpha, w, {u[i], v[i]});
+    facets.x[i] = static_cast<float>(m.x), facets.y[i] = static_cast<float>(m.y), facets.z[i] = static_cast<float>(m.z);
+  }
 }
 
 }  // namespace lobefit

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "models/geometry.h"
 #include "models/microfacet/distribution.h"
@@ -15,5 +16,14 @@ namespace lobefit {
 /// slope across by the inverse error function (Heitz, d'Eon 2014, section 5 of the supplement).
 Direction sample_visible_normal(Distribution distribution, double alpha, const Direction& w,
                                 const std::array<double, 2>& u);
+
+/// Facets in float, one array per component.
+struct FacetBatch {
+  std::span<float> x, y, z;
+};
+
+/// The same for many points, rounded to float; vectorised for GGX.
+void sample_visible_normals(Distribution distribution, double alpha, const Direction& w, std::span<const double> u,
+                            std::span<const double> v, const FacetBatch& facets);
 
 }  // namespace lobefit

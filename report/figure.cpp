@@ -74,7 +74,8 @@ std::vector<std::size_t> chosen_rows(const Table& table, const SliceChoice& choi
   if (!choice.parameter_rows.empty()) return choice.parameter_rows;
   const std::size_t all = table.parameter_rows(), count = std::min(all, most_default_rows);
   std::vector<std::size_t> rows;
-  for (std::size_t i = 0; i < count; ++i) rows.push_back(count == 1 ? 0 : (2 * i * (all - 1) + count - 1) / (2 * (count - 1)));
+  for (std::size_t i = 0; i < count; ++i)
+    rows.push_back(count == 1 ? 0 : (2 * i * (all - 1) + count - 1) / (2 * (count - 1)));
   return rows;
 }
 
@@ -109,8 +110,9 @@ std::size_t opposite_azimuth(const Axis& axis, std::size_t phi) {
   const auto found = std::find_if(axis.values.begin(), axis.values.end(),
                                   [&](double value) { return std::abs(value - opposite) < 1e-6; });
   if (found == axis.values.end()) {
-    throw Error(ExitCode::usage, fmt::format("the table has no azimuth {:.6g} across from {:.6g}", opposite, axis.values[phi]),
-                "figure", "show one side, or render a grid with both");
+    throw Error(ExitCode::usage,
+                fmt::format("the table has no azimuth {:.6g} across from {:.6g}", opposite, axis.values[phi]), "figure",
+                "show one side, or render a grid with both");
   }
   return static_cast<std::size_t>(found - axis.values.begin());
 }
@@ -156,7 +158,9 @@ std::string row_name(const Table& table, std::size_t row) {
 }
 
 /// Two significant digits.
-std::string rounded(double value) { return value < 10.0 ? fmt::format("{:#.2g}", value) : fmt::format("{:.0f}", value); }
+std::string rounded(double value) {
+  return value < 10.0 ? fmt::format("{:#.2g}", value) : fmt::format("{:.0f}", value);
+}
 
 std::string reference_name(const Table& reference) { return reference.model.empty() ? "reference" : reference.model; }
 
@@ -164,11 +168,11 @@ std::string azimuth_text(double phi) {
   return fmt::format("φ = {:.6g}°{}", phi, phi == 0.0 ? " (retro side)" : phi == 180.0 ? " (mirror side)" : "");
 }
 
-/// The next of 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10 and their decades.
+/// The next of 1, 2, 3, 4, 5, 6, 8, 10 and their decades: numbers whose half is short.
 double round_up(double value) {
   if (!(value > 0.0)) return 1.0;
   const double decade = std::pow(10.0, std::floor(std::log10(value)));
-  for (const double step : {1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0}) {
+  for (const double step : {1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0}) {
     if (value <= step * decade * (1.0 + 1e-9)) return step * decade;
   }
   return 10.0 * decade;
@@ -187,12 +191,13 @@ double tick_step(double span, int count) {
 // ---- Layout, in pixels from the top left ------------------------------------------------------------------------
 
 constexpr double title_size = 16.0, label_size = 12.0, tick_size = 11.0;
-/// Mean width of a character of DejaVu Sans in units of its size; bold is wider.
-constexpr double character_width = 0.6, bold_character_width = 0.68;
+/// Mean width of a character of DejaVu Sans in units of its size: 0.6, and 0.68 in bold.
+constexpr double character_width = 0.6;
 
-/// What both figures start with: size, coordinates, fonts, lines of the axes, title.
+/// What both figures start with: size, coordinates, fonts, lines of the axes, title. fitting() and shortened() keep a
+/// text within `room` pixels: first it gets smaller, down to 8 pixels, then it is cut. gnuplot takes a call for a
+/// string only where one precedes it, hence the ''.
 std::string header(const std::string& title, const std::string& subtitle) {
-  const double title_width = bold_character_width * title_size * static_cast<double>(std::max<std::size_t>(length(title), 1));
   return fmt::format(
       "set encoding utf8\n"
       "set minussign\n"
@@ -200,13 +205,21 @@ std::string header(const std::string& title, const std::string& subtitle) {
       "if (!exists('figure_height')) figure_height = 700\n"
       "across(pixels) = 1.0 * pixels / figure_width\n"
       "down(pixels) = 1.0 - 1.0 * pixels / figure_height\n"
-      "fitting(size, needed, available) = needed > available ? size * available / needed : size\n"
-      "title_size = fitting({0:.1f}, {1:.0f}, figure_width - 32)\n"
-      "set label 1 {2} at screen across(16), down(24) left noenhanced font sprintf(':Bold,%.1f', title_size)\n"
-      "set label 2 {3} at screen across(16), down(46) left font ',{4}' textcolor rgb '#555555'\n"
+      "at_8(text) = 0.68 * 8 * strlen(text)\n"
+      "fitting(text, size, room) = at_8(text) * size / 8 <= room ? size : at_8(text) < room ? 8 * room / at_8(text) : "
+      "8\n"
+      "shortened(text, room) = at_8(text) <= room ? text : text[1:int(room / (0.68 * 8)) - 1].'…'\n"
+      "bold(size) = sprintf('DejaVu Sans:Bold,%.1f', size)\n"
+      "plain(size) = sprintf('DejaVu Sans,%.1f', size)\n"
+      "figure_title = {}\n"
+      "figure_subtitle = {}\n"
+      "set label 1 ''.shortened(figure_title, figure_width - 32) at screen across(16), down(24) left noenhanced "
+      "font ''.bold(fitting(figure_title, {}, figure_width - 32))\n"
+      "set label 2 figure_subtitle at screen across(16), down(46) left textcolor rgb '#555555' "
+      "font ''.plain(fitting(figure_subtitle, {}, figure_width - 32))\n"
       "set border 3 linecolor rgb '#555555' linewidth 1\n"
-      "set tics nomirror out scale 0.5 font ',{5}' textcolor rgb '#000000'\n",
-      title_size, title_width, quoted(title), quoted(subtitle), label_size, tick_size);
+      "set tics nomirror out scale 0.5 font ''.plain({}) textcolor rgb '#000000'\n",
+      quoted(title), quoted(subtitle), title_size, label_size, tick_size);
 }
 
 /// Places `columns` × `lines` panels between the margins that the text before it has set: left, right, top, bottom,
@@ -215,7 +228,8 @@ std::string panel_layout(std::size_t columns, std::size_t lines) {
   return fmt::format(
       "panel_width = (right - left - {1} * gap_across) / {0}\n"
       "panel_height = (bottom - top - {3} * gap_down) / {2}\n"
-      "if (panel_width < 40 || panel_height < 40) printerr 'the figure is too small for {0} x {2} panels'; exit status 1\n",
+      "if (panel_width < 40 || panel_height < 40) printerr 'the figure is too small for {0} × {2} panels'; exit status "
+      "2\n",
       columns, columns - 1, lines, lines - 1);
 }
 
@@ -274,8 +288,10 @@ std::string slice_data(const std::string& name, const Table& table, const std::v
 }
 
 std::string legend_entry(std::size_t index, const std::string& label) {
-  return fmt::format("set label {0} {1} at screen legend_across({2}) + across(42), legend_down({2}) left noenhanced\n",
-                     101 + index, quoted(label), index);
+  return fmt::format(
+      "set label {0} ''.shortened({1}, figure_width - 74) at screen legend_across({2}) + across(42), legend_down({2}) "
+      "left noenhanced\n",
+      101 + index, quoted(label), index);
 }
 
 struct Range {
@@ -301,10 +317,12 @@ std::string slice_figure(const Table& reference, const std::vector<LabelledTable
 
   const double theta_o = reference.grid.theta_o.values[choice.theta_o], phi = reference.grid.phi.values[choice.phi];
   std::string subtitle = theta_o == 0.0 ? "view along the normal" : fmt::format("view at θ_o = {:.6g}°", theta_o);
-  if (theta_o != 0.0 && !choice.both_sides) subtitle += ", light at " + azimuth_text(phi);
-  if (choice.both_sides) {
-    subtitle += phi == 0.0 ? "; θ_i is negative on the side away from it"
-                           : fmt::format("; φ = {:.6g}°, opposite side at negative θ_i", phi);
+  if (choice.both_sides && phi == 0.0) {
+    subtitle += theta_o == 0.0 ? "" : ", on the side of positive θ_i";
+  } else if (choice.both_sides) {
+    subtitle += fmt::format(", light at φ = {:.6g}°, and across from it at negative θ_i", phi);
+  } else if (theta_o != 0.0) {
+    subtitle += ", light at " + azimuth_text(phi);
   }
 
   // Data, and the range that the panels share. A model that leaves the reference far behind is cut off, not followed.
@@ -359,40 +377,55 @@ std::string slice_figure(const Table& reference, const std::vector<LabelledTable
   text += panel_layout(columns, lines);
   text += shared_axis_labels(choice.both_sides ? "signed θ_i (degrees)" : "θ_i (degrees)", "π {/:Italic f} cos θ_i");
   // The reference comes first in the legend, the models follow as they were given.
+  text += "set style line 100 linecolor rgb '#000000' linewidth 1 dashtype solid pointtype 7 pointsize 0.5\n";
   text += legend_entry(0, reference_label);
-  text += "set label 100 '' at screen legend_across(0) + across(17), legend_down(0) point pointtype 7 pointsize 0.55\n";
+  text += "set label 100 '' at screen legend_across(0) + across(17), legend_down(0) point linestyle 100\n";
   if (has_errors) {
-    text += "set arrow 100 from screen legend_across(0) + across(17), legend_down(0) - 6.0 / figure_height "
-            "to screen legend_across(0) + across(17), legend_down(0) + 6.0 / figure_height nohead linewidth 1\n";
+    text +=
+        "set arrow 100 from screen legend_across(0) + across(17), legend_down(0) - 6.0 / figure_height "
+        "to screen legend_across(0) + across(17), legend_down(0) + 6.0 / figure_height nohead linestyle 100\n";
   }
   for (std::size_t m = 0; m < models.size(); ++m) {
-    // Past the last style colours repeat in a thinner line.
-    const auto& [colour, dashes] = line_styles[m % line_styles.size()];
-    text += fmt::format("set linetype {} linecolor rgb '{}' linewidth {} dashtype {}\n", m + 1, colour,
-                        m < line_styles.size() ? 2.2 : 1.1, dashes);
+    // Past the last style colours repeat, thinner and with other dashes.
+    const std::size_t round = m / line_styles.size();
+    text += fmt::format("set linetype {} linecolor rgb '{}' linewidth {} dashtype {}\n", m + 1,
+                        line_styles[m % line_styles.size()].colour, round == 0 ? 2.2 : 1.3,
+                        line_styles[(m + 3 * round) % line_styles.size()].dashes);
     text += legend_entry(m + 1, models[m].label);
-    text += fmt::format("set arrow {0} from screen legend_across({1}), legend_down({1}) "
-                        "to screen legend_across({1}) + across(34), legend_down({1}) nohead linetype {1}\n", 101 + m, m + 1);
+    text += fmt::format(
+        "set arrow {0} from screen legend_across({1}), legend_down({1}) "
+        "to screen legend_across({1}) + across(34), legend_down({1}) nohead linetype {1}\n",
+        101 + m, m + 1);
   }
   text += fmt::format(
-      "set style line 100 linecolor rgb '#000000' linewidth 1 pointtype 7 pointsize 0.55\n"
       "set grid linetype 1 linewidth 0.5 linecolor rgb '#e4e4e4' dashtype solid\n"
       "set xrange [{}:90]; set xtics {}\n"
       "set yrange [{:.6g}:{:.6g}]; set ytics {:g}\n",
-      choice.both_sides ? -90 : 0, choice.both_sides ? "-60,30,60" : columns > 2 ? "30" : "15", lower, upper,
-      tick_step(upper - lower, lines > 1 ? 6 : 10));
+      choice.both_sides ? -90 : 0,
+      choice.both_sides ? "-60,30,60"
+      : columns > 2     ? "30"
+                        : "15",
+      lower, upper, tick_step(upper - lower, lines > 1 ? 6 : 8));
   std::string view_line;
   if (choice.both_sides && phi == 0.0 && theta_o > 0.0) {
-    view_line = fmt::format("set arrow 1 from first {0:.6g}, graph 0 to first {0:.6g}, graph 1 nohead linecolor rgb '#999999' "
-                            "linewidth 1 dashtype (3,3) back\n", theta_o);
-    text += view_line + fmt::format("set label 5 'view' at first {:.6g}, graph 1 offset -0.5, -0.6 right font ',{}' "
-                                    "textcolor rgb '#777777'\n", theta_o, tick_size);
+    view_line = fmt::format(
+        "set arrow 1 from first {0:.6g}, graph 0 to first {0:.6g}, graph 1 nohead linecolor rgb '#999999' "
+        "linewidth 1 dashtype (3,3) back\n",
+        theta_o);
+    text += view_line + fmt::format(
+                            "set label 5 'view' at first {:.6g}, graph 1 offset -0.5, -0.6 right font ''.plain({}) "
+                            "textcolor rgb '#777777'\n",
+                            theta_o, tick_size);
   }
   text += "unset key\nset multiplot\n";
   for (std::size_t panel = 0; panel < rows.size(); ++panel) {
     const std::size_t column = panel % columns, line = panel / columns;
     text += panel_margins(column, line);
-    text += fmt::format("set title {} noenhanced offset 0, -0.6\n", quoted(row_name(reference, rows[panel])));
+    text += fmt::format(
+        "panel_title = {}\n"
+        "set title ''.shortened(panel_title, panel_width) noenhanced offset 0, -0.6 "
+        "font ''.plain(fitting(panel_title, {}, panel_width))\n",
+        quoted(row_name(reference, rows[panel])), label_size);
     text += column == 0 ? "set format y '%g'\n" : "set format y ''\n";
     text += panel + columns >= rows.size() ? "set format x '%g'\n" : "set format x ''\n";
     text += "plot";
@@ -401,7 +434,8 @@ std::string slice_figure(const Table& reference, const std::vector<LabelledTable
     }
     // Bars as strokes of their own: gnuplot's yerrorbars erase what lies around each point.
     if (has_errors) {
-      text += fmt::format(" $reference_{} using 1:($2-$3):(0):(2*$3) with vectors nohead linestyle 100, \\\n    ", panel + 1);
+      text += fmt::format(" $reference_{} using 1:($2-$3):(0):(2*$3) with vectors nohead linestyle 100, \\\n    ",
+                          panel + 1);
     }
     text += fmt::format(" $reference_{} using 1:2 with points linestyle 100\n", panel + 1);
     // Title, legend and shared labels belong to the figure, so they are drawn once.
@@ -489,7 +523,8 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
 
   std::string subtitle = fmt::format("model minus {}, light at {}", escaped(reference_name(reference)),
                                      azimuth_text(reference.grid.phi.values[choice.phi]));
-  if (largest > limit) subtitle += fmt::format("; colours saturate at ±{:g}, the largest difference is {}", limit, rounded(largest));
+  if (largest > limit)
+    subtitle += fmt::format("; colours saturate at ±{:g}, the largest difference is {}", limit, rounded(largest));
 
   std::string text = header(title, subtitle);
   for (std::size_t line = 0; line < rows.size(); ++line) {
@@ -497,8 +532,9 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
       text += fmt::format("$residual_{}_{} << EOD\n{}EOD\n", m + 1, line + 1, panels[line][m].cells);
     }
   }
-  text += "left = 62.0; right = figure_width - 132.0; top = 104.0; bottom = figure_height - 50.0\n"
-          "gap_across = 10.0; gap_down = 24.0\n";
+  text +=
+      "left = 62.0; right = figure_width - 132.0; top = 104.0; bottom = figure_height - 50.0\n"
+      "gap_across = 10.0; gap_down = 24.0\n";
   text += panel_layout(models.size(), rows.size());
   text += shared_axis_labels("θ_i (degrees)", "θ_o (degrees)");
   text += diverging_palette;
@@ -506,37 +542,42 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
   text += fmt::format(
       "set border 15\n"
       "set xrange [{:.6g}:{:.6g}]; set yrange [{:.6g}:{:.6g}]\n"
-      "set xtics 30; set ytics 30\n"
+      "set xtics 0,30,60; set ytics 0,30,60\n"
       "set cbrange [-{:g}:{:g}]; set cbtics {:g}\n"
       "set label 7 'π ({{/:Italic f}}_{{model}} − {{/:Italic f}}_{{reference}}) cos θ_i' "
       "at screen across(right + 114), down((top + bottom) / 2) center rotate by 90\n"
-      "set colorbox user origin screen across(right + 40), down(bottom) size screen across(14), (bottom - top) / figure_height\n"
+      "set colorbox user origin screen across(right + 40), down(bottom) size screen across(14), (bottom - top) / "
+      "figure_height\n"
       "set object 1 rectangle from graph 0, graph 0 to graph 1, graph 1 behind fillcolor rgb '#dddddd' "
       "fillstyle solid noborder\n"
       "set style fill solid 1.0 noborder\n"
       "unset key\n"
       "set multiplot\n",
       edges_i.front(), edges_i.back(), edges_o.front(), edges_o.back(), limit, limit, limit / 2.0);
-  const auto longest = std::max_element(models.begin(), models.end(), [](const auto& a, const auto& b) {
-    return length(a.label) < length(b.label);
-  });
-  text += fmt::format("label_size = fitting({}, {:.0f}, panel_width)\n", label_size,
-                      bold_character_width * label_size * static_cast<double>(length(longest->label)));
   for (std::size_t line = 0; line < rows.size(); ++line) {
     for (std::size_t m = 0; m < models.size(); ++m) {
       text += panel_margins(m, line);
       if (line == 0) {
-        text += fmt::format("set label 5 {} at graph 0.5, screen down(top - 26) center noenhanced "
-                            "font sprintf(':Bold,%.1f', label_size)\n", quoted(models[m].label));
+        text += fmt::format(
+            "column_title = {}\n"
+            "set label 5 ''.shortened(column_title, panel_width) at graph 0.5, screen down(top - 26) center "
+            "noenhanced font ''.bold(fitting(column_title, {}, panel_width))\n",
+            quoted(models[m].label), label_size);
       }
-      if (m + 1 == models.size() && reference.parameter_axes.size() > 0) {
-        text += fmt::format("set label 6 {} at screen across(right + 14), graph 0.5 center rotate by -90 noenhanced\n",
-                            quoted(row_name(reference, rows[line])));
+      if (m + 1 == models.size() && !reference.parameter_axes.empty()) {
+        text += fmt::format(
+            "line_title = {}\n"
+            "set label 6 ''.shortened(line_title, panel_height + gap_down) at screen across(right + 14), graph 0.5 "
+            "center rotate by -90 noenhanced font ''.plain(fitting(line_title, {}, panel_height + gap_down))\n",
+            quoted(row_name(reference, rows[line])), label_size);
       }
-      text += fmt::format("set title 'rms {}' font ',{}' offset 0, -0.9\n", rounded(panels[line][m].rms()), tick_size);
+      const Residuals& panel = panels[line][m];
+      text += fmt::format("set title '{}' font ''.plain({}) offset 0, -0.9\n",
+                          panel.values.empty() ? "masked" : "rms " + rounded(panel.rms()), tick_size);
       text += m == 0 ? "set format y '%g'\n" : "set format y ''\n";
       text += line + 1 == rows.size() ? "set format x '%g'\n" : "set format x ''\n";
-      text += fmt::format("plot $residual_{}_{} using (0):(0):1:2:3:4:5 with boxxyerror linecolor palette\n", m + 1, line + 1);
+      text += fmt::format("plot $residual_{}_{} using (0):(0):1:2:3:4:5 with boxxyerror linecolor palette\n", m + 1,
+                          line + 1);
       text += "unset label; unset colorbox\n";
     }
   }

@@ -1,7 +1,7 @@
 // Figures of tables: slices and residual maps, drawn by gnuplot.
 //
-//   SliceChoice choice{.theta_o = 12, .both_sides = true};                     // view at 60°, alpha spread over its axis
-//   const std::vector<LabelledTable> models{{"lambert", TableModel(lambert, values, reference).render()}};
+//   SliceChoice choice{.theta_o = 12, .both_sides = true};                     // view at 60°, alpha spread over its
+//   axis const std::vector<LabelledTable> models{{"lambert", TableModel(lambert, values, reference).render()}};
 //   write_figure(slice_figure(reference, models, choice, "Rough diffuse"), "slice.svg", /*overwrite=*/false);
 //
 // The first step makes a gnuplot program that holds all of its data, the second runs it. A program knows its size as

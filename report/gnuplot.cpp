@@ -130,16 +130,20 @@ std::string first_message(std::string_view messages) {
   return first.empty() ? "no message" : first;
 }
 
-/// Whoever looks at an SVG may not have DejaVu Sans; Verdana, from which it descends, has nearly its widths.
-std::string with_fallback_fonts(const std::string& svg) {
-  constexpr std::string_view attribute = "font-family=\"DejaVu Sans";
+/// gnuplot names fonts as fontconfig does, SVG as CSS does. Whoever looks at the SVG may not have DejaVu Sans; Verdana,
+/// from which it descends, has nearly its widths.
+std::string with_css_fonts(const std::string& svg) {
+  constexpr std::string_view attribute = "font-family=\"DejaVu Sans", bold = ":Bold";
   std::string result;
   std::size_t done = 0;
   for (std::size_t found; (found = svg.find(attribute, done)) != std::string::npos;) {
     const std::size_t end = found + attribute.size();
-    result.append(svg, done, end - done);
-    if (svg[end] == '"') result += ", Verdana, sans-serif";
-    done = end;
+    const bool is_bold = svg.compare(end, bold.size(), bold) == 0;
+    result.append(svg, done, found - done);
+    result += is_bold ? "font-weight=\"bold\" " : "";
+    result += attribute;
+    result += ", Verdana, sans-serif";
+    done = end + (is_bold ? bold.size() : 0);
   }
   return result.append(svg, done);
 }
@@ -158,24 +162,29 @@ void write_figure(const std::string& gnuplot_program, const std::filesystem::pat
     throw Error(ExitCode::usage, fmt::format("a figure of {} × {} pixels", size.width, size.height), path.string(),
                 fmt::format("choose {} to {} each way", smallest, largest));
   }
-  // Programs give font sizes in pixels; pngcairo takes them as points of 96 dpi.
-  const std::string terminal =
-      fmt::format("figure_width = {0}; figure_height = {1}; set terminal {2} size {0},{1} enhanced font 'DejaVu Sans,12' "
-                  "background '#ffffff'{3}",
-                  size.width, size.height, is_svg ? "svg" : "pngcairo", is_svg ? "" : " fontscale 0.75");
+  // Programs give font sizes in pixels; pngcairo takes them as points of 96 dpi, and draws smaller points than svg.
+  const std::string terminal = fmt::format(
+      "figure_width = {0}; figure_height = {1}; set terminal {2} size {0},{1} enhanced font 'DejaVu Sans,12' "
+      "background '#ffffff'{3}",
+      size.width, size.height, is_svg ? "svg" : "pngcairo", is_svg ? "" : " fontscale 0.75 pointscale 1.3");
   const Outcome outcome = run_gnuplot(terminal, gnuplot_program);
   if (WIFSIGNALED(outcome.wait_status)) {
     const int number = WTERMSIG(outcome.wait_status);
     throw Error(ExitCode::failure, fmt::format("gnuplot was killed by signal {} ({})", number, strsignal(number)),
                 path.string(), "check the free memory and try again");
   }
+  // Our programs' own complaint.
+  if (WEXITSTATUS(outcome.wait_status) == 2) {
+    throw Error(ExitCode::usage, first_message(outcome.messages),
+                fmt::format("{} × {} pixels", size.width, size.height), "choose a larger one, or fewer panels");
+  }
   if (WEXITSTATUS(outcome.wait_status) != 0 || outcome.picture.empty()) {
     throw Error(ExitCode::failure, "gnuplot failed: " + first_message(outcome.messages), path.string(),
-                "choose a larger figure if it asks for one; else please report this");
+                "the program is lobefit's own: please report this");
   }
   // Opened only now: a signal while gnuplot works finds no file to leave behind.
   OutputFile file(path, overwrite);
-  file.write(is_svg ? with_fallback_fonts(outcome.picture) : outcome.picture);
+  file.write(is_svg ? with_css_fonts(outcome.picture) : outcome.picture);
   file.commit();
 }
 

@@ -659,6 +659,16 @@ TEST(Fits, AreNeverWorseWithMoreStarts) {
   }
 }
 
+TEST(Fits, FindTheBetterValleyWithMoreStarts) {
+  // Two clusters of entries under Cauchy's loss: the start lies nearer the smaller one.
+  const Table table = lambertian_table([](std::size_t entry) { return entry % 5 < 3 ? 0.2 : 0.9; });
+  const Model& model = find_model("lambert");
+  FitOptions options{.free = {"albedo"}, .quantity = Quantity::brdf, .loss = Loss::cauchy, .loss_scale = 0.02};
+  EXPECT_NEAR(value(fit(model, model.defaults(), table, options, silent), "albedo"), 0.9, 0.01);
+  options.starts = 8;
+  EXPECT_NEAR(value(fit(model, model.defaults(), table, options, silent), "albedo"), 0.2, 0.01);
+}
+
 /// A table of albedo 0.5 in which every tenth entry says 0.9.
 Table table_with_outliers() { return lambertian_table([](std::size_t entry) { return entry % 10 == 0 ? 0.9 : 0.5; }); }
 
@@ -735,9 +745,12 @@ TEST(Fits, ReportWhenTheyAreInterrupted) {
     void check() override { throw Interrupted(); }
   } stop;
   const Table table = lambertian_table([](std::size_t) { return 0.4; });
+  ::testing::internal::CaptureStderr();
   expect_error(ExitCode::interrupted, "interrupted", [&] {
     fit(find_model("lambert"), find_model("lambert").defaults(), table, {.free = {"albedo"}}, stop);
   });
+  // What the user asked for is no error of the solver: its log stays out of the terminal.
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(Fits, AreTheSameBitsForAnyNumberOfThreads) {
