@@ -15,7 +15,8 @@ struct PlotArguments {
   std::string name, output, grid = "default", title;
   std::vector<std::string> settings, axes, models;
   double theta_o = 0.0, phi = 0.0;
-  FigureSize size;
+  bool both_sides = false;
+  int width = 0, height = 0;  // 0: what suits the figure
 };
 
 /// A table file, or a reference or model rendered here.
@@ -79,7 +80,7 @@ void add_plot(CLI::App& app, Context& context) {
       "  lobefit plot residuals truth.exr --with proxima --with eon:roughness=0.4*alpha^0.5 --phi 180 -o maps.png\n"
       "  lobefit plot slices microfacet_diffuse --axis alpha=0.1,0.5,1 --with proxima -o slices.png");
   verb->require_subcommand(1);
-  const auto add = [&](const char* name, const char* description, auto figure) {
+  const auto add = [&](const char* name, const char* description, auto figure, auto suitable_size) {
     CLI::App* kind = verb->add_subcommand(name, description);
     kind->fallthrough();
     const auto a = std::make_shared<PlotArguments>();
@@ -93,26 +94,35 @@ void add_plot(CLI::App& app, Context& context) {
     kind->add_option("--theta-o", a->theta_o, "View angle in degrees")->capture_default_str();
     kind->add_option("--phi", a->phi, "Azimuth difference in degrees: 0 is the retro side")->capture_default_str();
     kind->add_option("--title", a->title, "Title (default: the name)");
-    kind->add_option("--width", a->size.width, "Width in pixels")->check(CLI::Range(200, 8000))->capture_default_str();
-    kind->add_option("--height", a->size.height, "Height in pixels")->check(CLI::Range(150, 8000))->capture_default_str();
+    kind->add_option("--width", a->width, "Width in pixels (default: what suits the panels)")->check(CLI::Range(200, 8000));
+    kind->add_option("--height", a->height, "Height in pixels")->check(CLI::Range(200, 8000));
+    if (std::string_view(name) == "slices") {
+      kind->add_flag("--both-sides", a->both_sides, "Also the azimuth 180 - phi, at negative theta_i");
+    }
     kind->add_option("-o,--output", a->output, "Figure to write, .svg or .png")->required();
-    kind->callback([&context, a, figure] {
+    kind->callback([&context, a, figure, suitable_size] {
       const Table table = table_of(*a, context);
       std::vector<LabelledTable> lines;
       for (const std::string& text : a->models) lines.push_back(model_on(text, table));
       const SliceChoice choice{.theta_o = index_on(table.grid.theta_o, a->theta_o, "--theta-o"),
-                               .phi = index_on(table.grid.phi, a->phi, "--phi")};
-      write_figure(figure(table, lines, choice, a->title.empty() ? a->name : a->title), a->output, context.force, a->size);
+                               .phi = index_on(table.grid.phi, a->phi, "--phi"),
+                               .both_sides = a->both_sides};
+      FigureSize size = suitable_size(table, lines.size(), choice);
+      if (a->width > 0) size.width = a->width;
+      if (a->height > 0) size.height = a->height;
+      write_figure(figure(table, lines, choice, a->title.empty() ? a->name : a->title), a->output, context.force, size);
     });
   };
   add("slices", "pi f cos(theta_i) along theta_i, a panel per parameter row, with error bars",
       [](const Table& t, const std::vector<LabelledTable>& m, const SliceChoice& c, const std::string& title) {
         return slice_figure(t, m, c, title);
-      });
+      },
+      [](const Table& t, std::size_t, const SliceChoice& c) { return slice_figure_size(t, c); });
   add("residuals", "model minus reference over (theta_i, theta_o), a panel per model and parameter row",
       [](const Table& t, const std::vector<LabelledTable>& m, const SliceChoice& c, const std::string& title) {
         return residual_figure(t, m, c, title);
-      });
+      },
+      [](const Table& t, std::size_t models, const SliceChoice& c) { return residual_figure_size(t, models, c); });
 }
 
 }  // namespace lobefit

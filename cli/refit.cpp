@@ -125,19 +125,21 @@ void write_figures(const RecipeResult& result, const OutputFolder& folder) {
     if (line.method != "monte_carlo" || !drawn.insert(line.row->name).second) continue;
     const Table& table = result.tables[line.table].table;
     const std::vector<LabelledTable> lines = labelled(result, line, 6);
-    const auto write = [&](const std::string& kind, const std::string& program) {
-      for (const char* extension : {".svg", ".png"}) write_figure(program, folder.path(line.row->name + "." + kind + extension), true);
+    const auto write = [&](const std::string& kind, const std::string& program, const FigureSize& size) {
+      for (const char* extension : {".svg", ".png"}) {
+        write_figure(program, folder.path(line.row->name + "." + kind + extension), true, size);
+      }
     };
-    write("slices", slice_figure(table, lines, {}, line.row->name + ": normal view"));
+    write("slices", slice_figure(table, lines, {}, line.row->name), slice_figure_size(table, {}));
     if (table.grid.theta_o.size() > 1) {
-      const std::size_t mirror = table.grid.phi.size() - 1;
-      const std::size_t oblique = table.grid.theta_o.size() * 2 / 3;
-      const std::string view = fmt::format("{}: view at {:g}°", line.row->name, table.grid.theta_o.values[oblique]);
-      write("slices_retro", slice_figure(table, lines, {.theta_o = oblique, .phi = 0}, view));
-      write("slices_mirror", slice_figure(table, lines, {.theta_o = oblique, .phi = mirror}, view));
+      const SliceChoice oblique{.theta_o = table.grid.theta_o.size() * 2 / 3, .both_sides = true};
+      write("slices_oblique", slice_figure(table, lines, oblique, line.row->name), slice_figure_size(table, oblique));
       const std::vector<LabelledTable> few = labelled(result, line, 4);
-      write("residuals_retro", residual_figure(table, few, {}, line.row->name + ": retro side"));
-      write("residuals_mirror", residual_figure(table, few, {.phi = mirror}, line.row->name + ": mirror side"));
+      for (const bool retro : {true, false}) {
+        const SliceChoice side{.phi = retro ? 0 : table.grid.phi.size() - 1};
+        write(retro ? "residuals_retro" : "residuals_mirror", residual_figure(table, few, side, line.row->name),
+              residual_figure_size(table, few.size(), side));
+      }
     }
   }
 }

@@ -64,6 +64,7 @@ constexpr std::size_t batch_size = 1024;
 
 struct RobustResidual {
   double value, slope;
+  double bend;  // by how much the pull on the parameters, value × slope, follows the data: its derivative over slope
 };
 
 /// √ρ(s²) with the sign of s, and its derivative: squaring it gives the loss. ρ as in Ceres: Huber, Cauchy.
@@ -71,19 +72,20 @@ RobustResidual robust(Loss loss, double scale, double residual) {
   const double s = residual / scale;
   const double magnitude = std::abs(s);
   switch (loss) {
-    case Loss::none: return {residual, 1.0};
+    case Loss::none: break;
     case Loss::huber: {
-      if (magnitude <= 1.0) return {residual, 1.0};
+      if (magnitude <= 1.0) break;
       const double root = std::sqrt(2.0 * magnitude - 1.0);
-      return {std::copysign(scale * root, residual), 1.0 / root};
+      return {std::copysign(scale * root, residual), 1.0 / root, 0.0};  // the pull is constant
     }
     case Loss::cauchy: {
-      if (magnitude < 1e-8) return {residual, 1.0};
+      if (magnitude < 1e-8) break;
       const double root = std::sqrt(std::log1p(s * s));
-      return {std::copysign(scale * root, residual), magnitude / ((1.0 + s * s) * root)};
+      const double slope = magnitude / ((1.0 + s * s) * root);
+      return {std::copysign(scale * root, residual), slope, (1.0 - s * s) / (square(1.0 + s * s) * slope)};
     }
   }
-  return {residual, 1.0};
+  return {residual, 1.0, 1.0};
 }
 
 /// The fit as a least-squares problem over a set of entries.
@@ -174,7 +176,7 @@ class TableProblem {
     return std::all_of(finite.begin(), finite.end(), [](char f) { return f != 0; });
   }
 
-  /// Covariance of Jᵀr under the table's error. Jᵀ moves with the data only where the loss bends, which is left out.
+  /// Covariance of the cost's gradient under the table's error.
   std::vector<double> gradient_covariance(std::span<const double> x, std::span<const double> jacobian) const {
     const std::size_t p = x.size();
     std::vector<double> covariance(p * p, 0.0);
@@ -183,20 +185,21 @@ class TableProblem {
         for (std::size_t l = 0; l < p; ++l) covariance[k * p + l] += factor * g[k] * g[l];
       }
     };
+    const std::vector<double> slopes = data_slopes(x);
     std::vector<double> g(p);
     const auto replicates = static_cast<int>(table_.replicates.size() / table_.values.size());
     if (replicates > 0) {
       for (int r = 0; r < replicates; ++r) {
         std::fill(g.begin(), g.end(), 0.0);
-        for_each_residual(x, [&](std::size_t row, const Batch& batch, std::size_t i, int c, double slope) {
-          const double difference = slope * (table_.replicate(r, batch.entries[i], c) - table_.value(batch.entries[i], c));
+        for_each_residual([&](std::size_t row, std::size_t entry, int c) {
+          const double difference = slopes[row] * (table_.replicate(r, entry, c) - table_.value(entry, c));
           for (std::size_t k = 0; k < p; ++k) g[k] += jacobian[row * p + k] * difference;
         });
         add_product(g, 1.0 / (replicates * (replicates - 1.0)));
       }
     } else {
-      for_each_residual(x, [&](std::size_t row, const Batch& batch, std::size_t i, int c, double slope) {
-        const double error = slope * table_.standard_error(batch.entries[i], c);
+      for_each_residual([&](std::size_t row, std::size_t entry, int c) {
+        const double error = slopes[row] * table_.standard_error(entry, c);
         for (std::size_t k = 0; k < p; ++k) g[k] = jacobian[row * p + k] * error;
         add_product(g, 1.0);
       });
@@ -204,16 +207,36 @@ class TableProblem {
     return covariance;
   }
 
-  /// Calls visit(row, batch, i, channel, d residual / d table value) for every residual.
+  /// By how much each residual's pull moves with its table value, per Jacobian row.
+  std::vector<double> data_slopes(std::span<const double> x) const {
+    const auto channels = static_cast<std::size_t>(table_.channels);
+    std::vector<double> slopes(residual_count_);
+    for (const Batch& batch : batches_) {
+      const std::size_t n = batch.entries.size();
+      std::vector<double> values(channels * n), derivatives(channels * n * dual_width);
+      dual_.evaluate(flat_parameters(batch, x), variables_.variable_of_slot, 0, batch.wi, batch.wo, table_.channels,
+                     values.data(), derivatives.data());
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t c = 0; c < channels; ++c) {
+          const ValueAndSlope target =
+              transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)), batch.cos_theta_i[i]);
+          const double model = transform(options_.quantity, values[c * n + i], batch.cos_theta_i[i]).value;
+          slopes[batch.first_residual + i * channels + c] =
+              batch.root_weight[i] * target.slope * robust(options_.loss, options_.loss_scale, model - target.value).bend;
+        }
+      }
+    }
+    return slopes;
+  }
+
+  /// Calls visit(row, entry, channel) for every residual.
   template <class Visit>
-  void for_each_residual(std::span<const double>, Visit&& visit) const {
+  void for_each_residual(Visit&& visit) const {
     for (const Batch& batch : batches_) {
       for (std::size_t i = 0; i < batch.entries.size(); ++i) {
         for (int c = 0; c < table_.channels; ++c) {
-          const double slope =
-              transform(options_.quantity, table_.value(batch.entries[i], c), batch.cos_theta_i[i]).slope;
           visit(batch.first_residual + i * static_cast<std::size_t>(table_.channels) + static_cast<std::size_t>(c),
-                batch, i, c, batch.root_weight[i] * slope);
+                batch.entries[i], c);
         }
       }
     }
@@ -248,9 +271,9 @@ std::vector<FitMetric> all_metrics(const Table& table, std::span<const float> va
   return metrics;
 }
 
-void normalise(std::vector<double>& weights) {
+void normalise(std::vector<double>& weights, const char* mend) {
   const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
-  if (!(sum > 0.0)) throw Error(ExitCode::usage, "no entry is left", "--holdout", "hold out a smaller fraction");
+  if (!(sum > 0.0)) throw Error(ExitCode::usage, "no entry is left", "--holdout", mend);
   for (double& weight : weights) weight /= sum;
 }
 
@@ -276,8 +299,8 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
       const double u = SamplePoints(Sampler::philox, {options.seed, entry, 0})(0)[0];
       (u < options.holdout ? weights : held_out)[entry] = 0.0;
     }
-    normalise(weights);
-    normalise(held_out);
+    normalise(weights, "hold out a smaller fraction");
+    normalise(held_out, "hold out a larger fraction, or none");
   }
   const TableProblem problem(model, values, table, options, weights);
   const Variables& variables = problem.variables();
@@ -336,10 +359,17 @@ ParameterValues Fit::values() const {
     const ParameterInfo& info = result.info(parameter.name.substr(0, dot));
     if (dot == std::string::npos) {
       result.set(info.name, parameter.estimate.value);
-    } else {
-      const std::size_t channel = parameter.name.back() == 'r' ? 0 : parameter.name.back() == 'g' ? 1 : 2;
-      result.flat()[static_cast<std::size_t>(info.offset) + channel] = parameter.estimate.value;
+      continue;
     }
+    const auto suffix = std::find(channel_suffixes.begin(), channel_suffixes.end(), parameter.name.substr(dot));
+    if (info.components != 3 || suffix == channel_suffixes.end()) {
+      throw Error(ExitCode::usage, "'" + parameter.name + "' is no channel of a colour", model,
+                  "write NAME.r, NAME.g or NAME.b");
+    }
+    const std::span<const double> slots = result.components(info);
+    std::vector<double> channels(slots.begin(), slots.end());
+    channels[static_cast<std::size_t>(suffix - channel_suffixes.begin())] = parameter.estimate.value;
+    result.set(info.name, channels);
   }
   return result;
 }
@@ -406,11 +436,13 @@ Fit Fit::from_json(const Json& json, const std::string& place) {
                              .free = element.at("free").boolean()};
       parameter.estimate.value = element.at("value").number();
       parameter.estimate.standard_error = element.at("stderr").number();
+      parameter.estimate.misfit_standard_error = element.at("misfit_stderr").number();
       const std::vector<double> interval = element.at("ci95").numbers();
       if (interval.size() != 2) throw element.at("ci95").error("expected two numbers", "write [low, high]");
       parameter.estimate.ci_low = interval[0];
       parameter.estimate.ci_high = interval[1];
       parameter.estimate.at_bound = element.at("at_bound").boolean();
+      parameter.estimate.identifiable = !element.has("identifiable") || element.at("identifiable").boolean();
       result.parameters.push_back(parameter);
     }
     if (reader.has("map")) {

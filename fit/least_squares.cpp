@@ -30,9 +30,11 @@ class Cache : public ceres::EvaluationCallback {
       monitor_.check();
       valid = problem_.evaluate({x_, problem_.names.size()}, residuals, jacobians ? jacobian.data() : nullptr);
     } catch (...) {
-      // Ceres is not written to be thrown through: stop it, and throw again outside.
+      // Ceres is not written to be thrown through: stop it, and throw again outside. It would log an evaluation that
+      // fails, so this one pretends to have met the data.
       failure = std::current_exception();
-      valid = false;
+      std::fill(residuals.begin(), residuals.end(), 0.0);
+      std::fill(jacobian.begin(), jacobian.end(), 0.0);
     }
     has_residuals_ = true;
     has_jacobian_ = jacobians;
@@ -96,6 +98,46 @@ std::string direction_text(const Eigen::VectorXd& v, const std::vector<std::stri
   return text;
 }
 
+/// Eigenvalues of a normal matrix with unit diagonal, squared singular values, that count as 0.
+constexpr double threshold = 1e-12;
+
+/// Finds the directions in which the residuals don't change, and marks their variables. A variable at its bound takes
+/// part where the direction leads inside.
+void name_open_directions(const LeastSquaresProblem& problem, std::span<const double> x,
+                          const Eigen::Map<const RowMatrix>& j, LeastSquaresSolution& solution) {
+  std::vector<Eigen::Index> effective;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!solution.variables[i].identifiable) continue;
+    effective.push_back(static_cast<Eigen::Index>(i));
+    names.push_back(problem.names[i]);
+  }
+  if (effective.empty()) return;
+  const Eigen::MatrixXd columns = j(Eigen::all, effective);
+  const Eigen::VectorXd scale = columns.colwise().norm();
+  const Eigen::MatrixXd scaled = columns * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled);
+  for (Eigen::Index k = 0; k < scale.size() && eigen.eigenvalues()[k] <= threshold; ++k) {
+    const Eigen::VectorXd v = eigen.eigenvectors().col(k);
+    bool forwards = true, backwards = true;
+    for (Eigen::Index l = 0; l < v.size(); ++l) {
+      const auto i = static_cast<std::size_t>(effective[static_cast<std::size_t>(l)]);
+      if (!solution.variables[i].at_bound || std::abs(v[l]) <= 0.05) continue;
+      const bool at_lower = x[i] - problem.lower[i] < problem.upper[i] - x[i];
+      forwards = forwards && (at_lower == (v[l] > 0.0));
+      backwards = backwards && (at_lower == (v[l] < 0.0));
+    }
+    if (!forwards && !backwards) continue;
+    solution.identifiable = false;
+    solution.remarks.push_back("the data don't decide " + direction_text(v.cwiseQuotient(scale).normalized(), names));
+    for (Eigen::Index l = 0; l < v.size(); ++l) {
+      if (std::abs(v[l]) > 0.05) {
+        solution.variables[static_cast<std::size_t>(effective[static_cast<std::size_t>(l)])].identifiable = false;
+      }
+    }
+  }
+}
+
 /// Fills in errors, intervals, correlation and identifiability at the solution.
 void analyse(const LeastSquaresProblem& problem, std::span<const double> x, LeastSquaresSolution& solution) {
   const auto n = static_cast<Eigen::Index>(problem.residual_count);
@@ -117,7 +159,6 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
     largest = std::max(largest, effect[i]);
   }
   std::vector<Eigen::Index> active;
-  std::vector<std::string> active_names;
   for (std::size_t i = 0; i < x.size(); ++i) {
     FittedVariable& variable = solution.variables[i];
     const double range = problem.upper[i] - problem.lower[i];
@@ -130,9 +171,9 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
       solution.remarks.push_back(fmt::format("{} is at its bound {:g}", problem.names[i], x[i]));
     } else {
       active.push_back(static_cast<Eigen::Index>(i));
-      active_names.push_back(problem.names[i]);
     }
   }
+  name_open_directions(problem, x, j, solution);
   const auto m = static_cast<Eigen::Index>(active.size());
   solution.correlation.assign(x.size(), std::vector<double>(x.size(), 0.0));
   if (m == 0) {
@@ -148,19 +189,6 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
     ja.col(k) = j.col(active[static_cast<std::size_t>(k)]) / scale[k];
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(ja.transpose() * ja);
-  // Eigenvalues of the scaled normal matrix are squared singular values.
-  const double threshold = 1e-12;
-  for (Eigen::Index k = 0; k < m; ++k) {
-    if (eigen.eigenvalues()[k] > threshold) continue;
-    solution.identifiable = false;
-    solution.remarks.push_back("the data don't decide " +
-                               direction_text(eigen.eigenvectors().col(k).cwiseQuotient(scale).normalized(), active_names));
-    for (Eigen::Index l = 0; l < m; ++l) {
-      if (std::abs(eigen.eigenvectors()(l, k)) > 0.05) {
-        solution.variables[static_cast<std::size_t>(active[static_cast<std::size_t>(l)])].identifiable = false;
-      }
-    }
-  }
   const Eigen::VectorXd inverse_values =
       eigen.eigenvalues().unaryExpr([&](double v) { return v > threshold ? 1.0 / v : 0.0; });
   const Eigen::MatrixXd inverse_normal =

@@ -20,6 +20,8 @@ using Json = nlohmann::ordered_json;
 inline Json parse_json(const std::string& text, const std::string& place) {
   try {
     return Json::parse(text);
+  } catch (const Json::out_of_range&) {
+    throw Error(ExitCode::invalid_input, "a number is too large", place, "write finite numbers");
   } catch (const Json::parse_error& error) {
     const std::size_t byte = std::min(error.byte == 0 ? 0 : error.byte - 1, text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(byte), '\n');
@@ -100,5 +102,8 @@ class JsonReader {
   const Json* value_;
   std::string place_, path_;
 };
+
+/// Throws Error(invalid_input) unless the list holds increasing angles from 0 to `upper`, itself included if `closed`.
+void check_angles(const JsonReader& reader, double upper, bool closed);
 
 }  // namespace lobefit

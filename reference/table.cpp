@@ -54,23 +54,27 @@ Grid Grid::named_or_file(const std::string& name) {
   return from_json(parse_json(read_file(name), name), name);
 }
 
+void check_angles(const JsonReader& reader, double upper, bool closed) {
+  const std::vector<double> angles = reader.numbers();
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    const double angle = angles[i];
+    if (!(angle >= 0.0 && (closed ? angle <= upper : angle < upper))) {
+      throw reader.error(number_text(angle) + " is out of range", "choose angles from 0 to " +
+                         std::string(closed ? "" : "below ") + number_text(upper) + " degrees");
+    }
+    if (i > 0 && !(angle > angles[i - 1])) {
+      throw reader.error("angles do not increase", "sort them and remove repetitions");
+    }
+  }
+}
+
 Grid Grid::from_json(const Json& json, const std::string& place) {
   const JsonReader reader(json, place);
   reader.allow({"theta_i", "theta_o", "phi", "midpoints"});
   const bool midpoints = reader.has("midpoints") && reader.at("midpoints").boolean();
   const auto axis = [&](const char* name, double upper, bool closed) {
     Axis result{name, "degree", reader.at(name).numbers(), midpoints};
-    for (std::size_t i = 0; i < result.values.size(); ++i) {
-      const double angle = result.values[i];
-      if (!(angle >= 0.0 && (closed ? angle <= upper : angle < upper))) {
-        throw reader.at(name).error(number_text(angle) + " is out of range",
-                                    "choose angles from 0 to " + std::string(closed ? "" : "below ") + number_text(upper) +
-                                        " degrees");
-      }
-      if (i > 0 && !(angle > result.values[i - 1])) {
-        throw reader.at(name).error("angles do not increase", "sort them and remove repetitions");
-      }
-    }
+    check_angles(reader.at(name), upper, closed);
     return result;
   };
   return {axis("theta_i", 90.0, false), axis("theta_o", 90.0, false), axis("phi", 180.0, true)};

@@ -4,9 +4,13 @@
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStdIO.h>
 #include <OpenEXR/ImfStringAttribute.h>
 
 #include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
 
 #include "models/error.h"
 #include "reference/json_reader.h"
@@ -85,9 +89,17 @@ void Table::write(const std::filesystem::path& path) const {
       header.channels().insert(plane.name, Imf::Channel(Imf::FLOAT));
       frame.insert(plane.name, slice(plane.data, width()));
     }
-    Imf::OutputFile file(path.c_str(), header);
-    file.setFrameBuffer(frame);
-    file.writePixels(static_cast<int>(height()));
+    std::ofstream stream(path, std::ios::binary);
+    if (!stream) throw std::runtime_error(std::strerror(errno));
+    {
+      Imf::StdOFStream exr_stream(stream, path.c_str());
+      Imf::OutputFile file(exr_stream, header);
+      file.setFrameBuffer(frame);
+      file.writePixels(static_cast<int>(height()));
+    }
+    // OpenEXR writes its last bytes in a destructor, which keeps failures to itself.
+    stream.close();
+    if (!stream) throw std::runtime_error("the last bytes could not be written");
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {
@@ -107,7 +119,10 @@ Table Table::read(const std::filesystem::path& path) {
     const auto attribute = [&](const char* name) -> std::string {
       const auto* found = header.findTypedAttribute<Imf::StringAttribute>(std::string("lobefit:") + name);
       if (!found) throw invalid(path, std::string("an EXR picture, but not a lobefit table: no attribute lobefit:") + name);
-      return found->value();
+      // Broken files put control characters here, which would cut or garble messages.
+      std::string text = found->value();
+      for (char& c : text) c = static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t' && c != '\r' ? '?' : c;
+      return text;
     };
     const auto number = [&](const char* name) {
       const std::string text = attribute(name);
@@ -125,6 +140,11 @@ Table Table::read(const std::filesystem::path& path) {
     for (const JsonReader& reader : JsonReader(axes, axes_place).elements()) {
       Axis axis{reader.at("name").text(), reader.at("unit").text(), reader.at("values").numbers(),
                 reader.at("kind").text() == "midpoints"};
+      if (!axis.midpoints && reader.at("kind").text() != "points") {
+        throw reader.at("kind").error("unknown kind of axis", "write points or midpoints");
+      }
+      if (axis.name == "theta_i" || axis.name == "theta_o") check_angles(reader.at("values"), 90.0, false);
+      if (axis.name == "phi") check_angles(reader.at("values"), 180.0, true);
       if (axis.name == "theta_i") table.grid.theta_i = axis;
       else if (axis.name == "theta_o") table.grid.theta_o = axis;
       else if (axis.name == "phi") table.grid.phi = axis;
@@ -141,8 +161,18 @@ Table Table::read(const std::filesystem::path& path) {
       throw invalid(path, "the picture is " + std::to_string(width) + " × " + std::to_string(height) +
                               ", its axes say " + std::to_string(table.width()) + " × " + std::to_string(table.height()));
     }
+    // Deflate packs at most 1032 : 1, so a file also bounds what may be allocated for it.
+    double bytes = 0.0;
+    for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) {
+      bytes += 4.0 * static_cast<double>(width) * static_cast<double>(height);
+    }
+    if (bytes > 1100.0 * static_cast<double>(std::filesystem::file_size(path))) {
+      throw invalid(path, "truncated: the picture is " + std::to_string(width) + " × " + std::to_string(height) +
+                              ", more than a file of its size can hold");
+    }
     table.model = attribute("reference");
     table.parameters = parse_json(attribute("params"), path.string() + ", lobefit:params");
+    if (!table.parameters.is_object()) throw invalid(path, "attribute lobefit:params is not an object");
     table.method = attribute("method");
     table.seed = number("seed");
     table.samples = number("samples");
@@ -171,6 +201,9 @@ Table Table::read(const std::filesystem::path& path) {
       bool finite = mask[i] != 0.0f;
       for (int c = 0; c < table.channels; ++c) {
         finite = finite && std::isfinite(table.value(i, c)) && std::isfinite(table.standard_error(i, c));
+        for (int r = 0; r < replicate_count && !table.replicates.empty(); ++r) {
+          finite = finite && std::isfinite(table.replicate(r, i, c));
+        }
       }
       table.valid[i] = finite ? 1 : 0;
     }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "reference/json_reader.h"
+
 namespace lobefit {
 
 AxisMapping AxisMapping::parse(std::string_view text) {
@@ -79,10 +81,11 @@ Table TableModel::render() const {
 ParameterValues with_table_parameters(ParameterValues values, const Table& table) {
   for (const auto& [name, value] : table.parameters.items()) {
     if (!values.has(name) || value.is_string()) continue;
-    if (value.is_array()) {
-      values.set(name, value.get<std::vector<double>>());
-    } else {
-      values.set(name, value.get<double>());
+    const JsonReader reader(value, "the table's parameters", "$." + name);
+    try {
+      values.set(name, value.is_array() ? reader.numbers() : std::vector{reader.number()});
+    } catch (const Error& error) {
+      throw error.code() == ExitCode::usage ? error.inside(ExitCode::invalid_input, "the table's parameters") : error;
     }
   }
   return values;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "models/error.h"
 #include "models/scalar.h"
@@ -50,7 +51,7 @@ struct Place {
   }
 };
 
-/// π f cos θi, or its standard error. Channels share their samples, so their errors are averaged like their values.
+/// π f cos θi. Channels share their samples, so their errors are averaged like their values.
 struct Shown {
   double value, standard_error;
 };
@@ -74,8 +75,9 @@ std::vector<std::size_t> chosen_rows(const Table& table, const SliceChoice& choi
   if (!choice.parameter_rows.empty()) return choice.parameter_rows;
   const std::size_t all = table.parameter_rows(), count = std::min(all, most_default_rows);
   std::vector<std::size_t> rows;
-  for (std::size_t i = 0; i < count; ++i)
+  for (std::size_t i = 0; i < count; ++i) {
     rows.push_back(count == 1 ? 0 : (2 * i * (all - 1) + count - 1) / (2 * (count - 1)));
+  }
   return rows;
 }
 
@@ -119,13 +121,29 @@ std::size_t opposite_azimuth(const Axis& axis, std::size_t phi) {
 
 // ---- Text -----------------------------------------------------------------------------------------------------
 
-/// A gnuplot string in which nothing is special: within single quotes only the quote itself is, and it is doubled.
-std::string quoted(const std::string& text) {
+/// Bytes of the character that `text`, which is not empty, starts with; 0 if it is not UTF-8.
+std::size_t character_bytes(std::string_view text) {
+  const auto lead = static_cast<unsigned char>(text[0]);
+  const std::size_t count = lead < 0x80 ? 1 : lead < 0xC2 ? 0 : lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : lead < 0xF5 ? 4 : 0;
+  if (count == 0 || count > text.size()) return 0;
+  const auto continues = [](char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; };
+  return std::ranges::all_of(text.substr(1, count - 1), continues) ? count : 0;
+}
+
+/// A gnuplot string in which nothing is special: within single quotes only the quote itself is, and it is doubled. What
+/// is no text, such as the bytes of a file name in another encoding, becomes a question mark: SVG could not hold it.
+std::string literal(std::string_view text) {
   std::string result = "'";
-  for (const char character : text) {
-    const bool is_control = static_cast<unsigned char>(character) < 0x20;
-    result += is_control ? ' ' : character;
-    if (character == '\'') result += '\'';
+  while (!text.empty()) {
+    const std::size_t count = character_bytes(text);
+    if (count == 0) {
+      result += '?';
+    } else if (static_cast<unsigned char>(text[0]) < 0x20) {
+      result += ' ';
+    } else {
+      result += text[0] == '\'' ? "''" : text.substr(0, count);
+    }
+    text.remove_prefix(std::max<std::size_t>(count, 1));
   }
   return result + "'";
 }
@@ -206,8 +224,8 @@ std::string header(const std::string& title, const std::string& subtitle) {
       "across(pixels) = 1.0 * pixels / figure_width\n"
       "down(pixels) = 1.0 - 1.0 * pixels / figure_height\n"
       "at_8(text) = 0.68 * 8 * strlen(text)\n"
-      "fitting(text, size, room) = at_8(text) * size / 8 <= room ? size : at_8(text) < room ? 8 * room / at_8(text) : "
-      "8\n"
+      "fitting(text, size, room) = at_8(text) * size / 8 <= room ? size : "
+      "at_8(text) < room ? 8 * room / at_8(text) : 8\n"
       "shortened(text, room) = at_8(text) <= room ? text : text[1:int(room / (0.68 * 8)) - 1].'…'\n"
       "bold(size) = sprintf('DejaVu Sans:Bold,%.1f', size)\n"
       "plain(size) = sprintf('DejaVu Sans,%.1f', size)\n"
@@ -219,7 +237,7 @@ std::string header(const std::string& title, const std::string& subtitle) {
       "font ''.plain(fitting(figure_subtitle, {}, figure_width - 32))\n"
       "set border 3 linecolor rgb '#555555' linewidth 1\n"
       "set tics nomirror out scale 0.5 font ''.plain({}) textcolor rgb '#000000'\n",
-      quoted(title), quoted(subtitle), title_size, label_size, tick_size);
+      literal(title), literal(subtitle), title_size, label_size, tick_size);
 }
 
 /// Places `columns` × `lines` panels between the margins that the text before it has set: left, right, top, bottom,
@@ -228,8 +246,8 @@ std::string panel_layout(std::size_t columns, std::size_t lines) {
   return fmt::format(
       "panel_width = (right - left - {1} * gap_across) / {0}\n"
       "panel_height = (bottom - top - {3} * gap_down) / {2}\n"
-      "if (panel_width < 40 || panel_height < 40) printerr 'the figure is too small for {0} × {2} panels'; exit status "
-      "2\n",
+      "if (panel_width < 40 || panel_height < 40) "
+      "printerr 'the figure is too small for {0} × {2} panels'; exit status 2\n",
       columns, columns - 1, lines, lines - 1);
 }
 
@@ -247,7 +265,7 @@ std::string shared_axis_labels(const std::string& horizontal, const std::string&
   return fmt::format(
       "set label 3 {} at screen across((left + right) / 2), down(bottom + 36) center\n"
       "set label 4 {} at screen across(18), down((top + bottom) / 2) center rotate by 90\n",
-      quoted(horizontal), quoted(vertical));
+      literal(horizontal), literal(vertical));
 }
 
 // ---- Slices ---------------------------------------------------------------------------------------------------
@@ -291,7 +309,7 @@ std::string legend_entry(std::size_t index, const std::string& label) {
   return fmt::format(
       "set label {0} ''.shortened({1}, figure_width - 74) at screen legend_across({2}) + across(42), legend_down({2}) "
       "left noenhanced\n",
-      101 + index, quoted(label), index);
+      101 + index, literal(label), index);
 }
 
 struct Range {
@@ -397,15 +415,12 @@ std::string slice_figure(const Table& reference, const std::vector<LabelledTable
         "to screen legend_across({1}) + across(34), legend_down({1}) nohead linetype {1}\n",
         101 + m, m + 1);
   }
+  const char* ticks = choice.both_sides ? "-60,30,60" : columns > 2 ? "30" : "15";
   text += fmt::format(
       "set grid linetype 1 linewidth 0.5 linecolor rgb '#e4e4e4' dashtype solid\n"
       "set xrange [{}:90]; set xtics {}\n"
       "set yrange [{:.6g}:{:.6g}]; set ytics {:g}\n",
-      choice.both_sides ? -90 : 0,
-      choice.both_sides ? "-60,30,60"
-      : columns > 2     ? "30"
-                        : "15",
-      lower, upper, tick_step(upper - lower, lines > 1 ? 6 : 8));
+      choice.both_sides ? -90 : 0, ticks, lower, upper, tick_step(upper - lower, lines > 1 ? 6 : 8));
   std::string view_line;
   if (choice.both_sides && phi == 0.0 && theta_o > 0.0) {
     view_line = fmt::format(
@@ -425,7 +440,7 @@ std::string slice_figure(const Table& reference, const std::vector<LabelledTable
         "panel_title = {}\n"
         "set title ''.shortened(panel_title, panel_width) noenhanced offset 0, -0.6 "
         "font ''.plain(fitting(panel_title, {}, panel_width))\n",
-        quoted(row_name(reference, rows[panel])), label_size);
+        literal(row_name(reference, rows[panel])), label_size);
     text += column == 0 ? "set format y '%g'\n" : "set format y ''\n";
     text += panel + columns >= rows.size() ? "set format x '%g'\n" : "set format x ''\n";
     text += "plot";
@@ -523,8 +538,9 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
 
   std::string subtitle = fmt::format("model minus {}, light at {}", escaped(reference_name(reference)),
                                      azimuth_text(reference.grid.phi.values[choice.phi]));
-  if (largest > limit)
+  if (largest > limit) {
     subtitle += fmt::format("; colours saturate at ±{:g}, the largest difference is {}", limit, rounded(largest));
+  }
 
   std::string text = header(title, subtitle);
   for (std::size_t line = 0; line < rows.size(); ++line) {
@@ -546,8 +562,8 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
       "set cbrange [-{:g}:{:g}]; set cbtics {:g}\n"
       "set label 7 'π ({{/:Italic f}}_{{model}} − {{/:Italic f}}_{{reference}}) cos θ_i' "
       "at screen across(right + 114), down((top + bottom) / 2) center rotate by 90\n"
-      "set colorbox user origin screen across(right + 40), down(bottom) size screen across(14), (bottom - top) / "
-      "figure_height\n"
+      "set colorbox user origin screen across(right + 40), down(bottom) "
+      "size screen across(14), (bottom - top) / figure_height\n"
       "set object 1 rectangle from graph 0, graph 0 to graph 1, graph 1 behind fillcolor rgb '#dddddd' "
       "fillstyle solid noborder\n"
       "set style fill solid 1.0 noborder\n"
@@ -562,14 +578,14 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
             "column_title = {}\n"
             "set label 5 ''.shortened(column_title, panel_width) at graph 0.5, screen down(top - 26) center "
             "noenhanced font ''.bold(fitting(column_title, {}, panel_width))\n",
-            quoted(models[m].label), label_size);
+            literal(models[m].label), label_size);
       }
       if (m + 1 == models.size() && !reference.parameter_axes.empty()) {
         text += fmt::format(
             "line_title = {}\n"
             "set label 6 ''.shortened(line_title, panel_height + gap_down) at screen across(right + 14), graph 0.5 "
             "center rotate by -90 noenhanced font ''.plain(fitting(line_title, {}, panel_height + gap_down))\n",
-            quoted(row_name(reference, rows[line])), label_size);
+            literal(row_name(reference, rows[line])), label_size);
       }
       const Residuals& panel = panels[line][m];
       text += fmt::format("set title '{}' font ''.plain({}) offset 0, -0.9\n",

@@ -256,8 +256,14 @@ TEST_F(WriteFigure, ShowsLabelsAsTheyAre) {
                folder / "a.svg", false);
   const std::string svg = read_file(folder / "a.svg");
   EXPECT_NE(svg.find(label), std::string::npos);
-  EXPECT_NE(svg.find("&lt;b&gt; &amp; "), std::string::npos);
+  EXPECT_NE(svg.find("&lt;b"), std::string::npos);
+  EXPECT_NE(svg.find("&amp; \"title\" $(id)"), std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "injected"));
+}
+
+TEST_F(WriteFigure, ReplacesBytesThatAreNoText) {
+  const std::string program = slice_figure(make_table(0.3), {{"\xE9t\xC3\xA9 \xE2\x82", make_table(0.25)}}, {}, "");
+  EXPECT_NE(program.find("'?t\xC3\xA9 ?\?'"), std::string::npos);
 }
 
 TEST_F(WriteFigure, ToleratesPathsThatAShellWouldNot) {
@@ -326,13 +332,12 @@ TEST_F(WriteFigure, LeavesNothingInAFolderThatIsNotThere) {
   EXPECT_TRUE(fs::is_empty(folder));
 }
 
-TEST(FigureSizes, FitTheirPanels) {
+TEST_F(WriteFigure, SuggestsSizesThatFitThePanels) {
   const Table reference = make_table(0.3);
   const std::vector<LabelledTable> models(5, {"model", reference});
-  const fs::path path = fs::temp_directory_path() / "lobefit_figure_size.svg";
+  const fs::path path = folder / "a.svg";
   write_figure(slice_figure(reference, models, {}, ""), path, true, slice_figure_size(reference, {}));
   write_figure(residual_figure(reference, models, {}, ""), path, true, residual_figure_size(reference, 5, {}));
-  fs::remove(path);
 }
 
 }  // namespace

@@ -403,6 +403,7 @@ TEST(VisibleNormals, FollowTheirDensity) {
   constexpr int sub = 20;
   constexpr std::uint32_t samples = 200'000;
   double smallest_p_value = 1.0;
+  std::uint64_t configuration = 0;
   for (const Distribution distribution : both_distributions) {
     for (const double alpha : {0.1, 0.8}) {
       for (const double theta : {0.0, 30.0, 60.0, 85.0, 89.0}) {
@@ -425,7 +426,7 @@ TEST(VisibleNormals, FollowTheirDensity) {
         }
         EXPECT_NEAR(total / samples, 1.0, 1e-3) << "the density is not normalised: the test is wrong";
 
-        const SamplePoints points(Sampler::philox, {3, 0, 0});
+        const SamplePoints points(Sampler::philox, {3, configuration++, 0});
         for (std::uint32_t k = 0; k < samples; ++k) {
           const Direction m = sample_visible_normal(distribution, alpha, w, points(k));
           const double x = std::atan2(std::hypot(m.x, m.y), alpha * m.z);
@@ -463,6 +464,34 @@ TEST(VisibleNormals, FollowTheirDensity) {
     }
   }
   RecordProperty("smallest_p_value", number_text(smallest_p_value));
+}
+
+TEST(VisibleNormals, OfAFullHemisphereAreCosineWeighted) {
+  // GGX of α = 1 has D = 1/π: facets seen from the normal are the disk point (√u, 2πv) lifted to the sphere.
+  for (std::uint32_t k = 0; k < 4096; ++k) {
+    const double u = unit_interval(k * 0x9E3779B9u), v = unit_interval(k << 20);
+    const Direction m = sample_visible_normal(Distribution::ggx, 1.0, {0.0, 0.0, 1.0}, {u, v});
+    ASSERT_NEAR(m.x, std::sqrt(u) * std::cos(2.0 * pi * v), 2e-15) << v;
+    ASSERT_NEAR(m.y, std::sqrt(u) * std::sin(2.0 * pi * v), 2e-15) << v;
+    ASSERT_NEAR(m.z, std::sqrt(1.0 - u), 1e-14) << v;
+  }
+}
+
+TEST(VisibleNormals, BatchesAreTheSameRounded) {
+  constexpr std::size_t count = 203;
+  const Direction w = from_degrees(70.0, 25.0);
+  std::vector<double> u(count), v(count);
+  SamplePoints(Sampler::philox, {5, 0, 0}).fill(0, u, v);
+  std::vector<float> x(count), y(count), z(count);
+  for (const Distribution distribution : both_distributions) {
+    sample_visible_normals(distribution, 0.3, w, u, v, {x, y, z});
+    for (std::size_t i = 0; i < count; ++i) {
+      const Direction m = sample_visible_normal(distribution, 0.3, w, {u[i], v[i]});
+      ASSERT_EQ(x[i], static_cast<float>(m.x));
+      ASSERT_EQ(y[i], static_cast<float>(m.y));
+      ASSERT_EQ(z[i], static_cast<float>(m.z));
+    }
+  }
 }
 
 TEST(VisibleNormals, AreVisibleUnitVectors) {

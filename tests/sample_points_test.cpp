@@ -129,6 +129,24 @@ TEST(SamplePoints, StreamsOfDifferentKeysDiffer) {
   }
 }
 
+TEST(SamplePoints, BatchesHoldTheSameBits) {
+  for (const Sampler sampler : samplers) {
+    const SamplePoints points(sampler, {42, 7, 3});
+    for (const std::uint32_t first : {0u, 1u, 1000u, 0x7ffffff0u, ~0u - 100u}) {
+      // Lengths around those of vectors: bodies and remainders of the loop.
+      for (const std::size_t count : {0u, 1u, 7u, 8u, 9u, 33u, 100u}) {
+        std::vector<double> u(count), v(count);
+        points.fill(first, u, v);
+        for (std::size_t i = 0; i < count; ++i) {
+          const auto [x, y] = points(first + static_cast<std::uint32_t>(i));
+          ASSERT_EQ(u[i], x) << name(sampler) << ", point " << first << " + " << i;
+          ASSERT_EQ(v[i], y) << name(sampler) << ", point " << first << " + " << i;
+        }
+      }
+    }
+  }
+}
+
 TEST(SamplePoints, NeighbouringStreamsAreUncorrelated) {
   // Σ 12 (u_k - ½)(u_{k+1} - ½)/√n has variance 1 and is normal for n this large.
   constexpr std::uint32_t n = 1u << 14;
