@@ -1,5 +1,6 @@
 #include "evaluate/expression.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -66,11 +67,13 @@ const ShaderNode* Trace::node(Operation operation, ShaderType type, std::vector<
   return shader_.nodes.back().get();
 }
 
-bool Trace::has_function(std::string_view name) const {
-  for (const ShaderFunction& function : shader_.functions) {
-    if (function.name == name) return true;
+bool Trace::has_function(std::string_view name, const std::vector<ShaderType>& types) const {
+  const auto known = std::ranges::find(shader_.functions, name, &ShaderFunction::name);
+  if (known == shader_.functions.end()) return false;
+  if (!std::ranges::equal(known->arguments, types, {}, &ShaderArgument::type)) {
+    throw std::logic_error("function '" + std::string(name) + "' is called with scalars and with vectors");
   }
-  return false;
+  return true;
 }
 
 Shader Trace::finish(ShaderFunction brdf) {

@@ -74,7 +74,8 @@ class Trace {
   /// The shared node of this content.
   const ShaderNode* node(Operation operation, ShaderType type, std::vector<const ShaderNode*> operands,
                          std::string name = "", double literal = 0.0);
-  bool has_function(std::string_view name) const;
+  /// Throws std::logic_error if the function is known with other argument types: a shader has one text per function.
+  bool has_function(std::string_view name, const std::vector<ShaderType>& types) const;
   void add_function(ShaderFunction function) { shader_.functions.push_back(std::move(function)); }
   Shader finish(ShaderFunction brdf);
 
@@ -188,7 +189,8 @@ struct TracedCall {
   static auto trace(const A&... arguments) {
     Trace& tracer = Trace::current();
     using R = decltype(F::evaluate(placeholder<A>("")...));
-    if (!tracer.has_function(F::name)) {
+    const std::vector<ShaderType> types{traced::type_of<A>...};
+    if (!tracer.has_function(F::name, types)) {
       static_assert(sizeof...(A) == std::tuple_size_v<std::remove_cvref_t<decltype(F::arguments)>>);
       define(tracer, std::index_sequence_for<A...>{}, arguments...);
     }

@@ -62,6 +62,7 @@ class FunctionPrinter {
   FunctionPrinter(const Language& language, const ShaderFunction& function) : language_(language) {
     std::vector<const ShaderNode*> reachable;
     collect(function.result, reachable);
+    // The order of the model's text; within one statement it is the compiler's order of evaluation.
     std::sort(reachable.begin(), reachable.end(), [](auto* a, auto* b) { return a->order < b->order; });
     taken_ = reserved_names();
     for (const ShaderArgument& argument : function.arguments) taken_.insert(argument.name);

@@ -65,7 +65,7 @@ class Single {
     return Single(p * std::bit_cast<float>((half + 127) << 23) * std::bit_cast<float>((whole - half + 127) << 23));
   }
 
-  /// log2 of max(x, smallest_base): relative error below 2e-7, also near 1.
+  /// log2 of max(x, smallest_base): relative error below 2.4e-7, also near 1.
   LOBEFIT_TEXT friend Single log2(Single x) {
     const std::int32_t bits = std::bit_cast<std::int32_t>(max(x, smallest_base).value);
     // m in [√½, √2) and its exponent, by an offset that carries at √2.

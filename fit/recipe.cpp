@@ -44,7 +44,7 @@ auto in_file(const JsonReader& reader, Read&& read) {
   }
 }
 
-Rival read_rival(const JsonReader& reader) {
+Rival read_rival(const JsonReader& reader, const std::vector<Axis>& axes) {
   reader.allow({"label", "model", "set", "map", "free_per_row"});
   Rival rival;
   rival.model = reader.at("model").text();
@@ -57,7 +57,15 @@ Rival read_rival(const JsonReader& reader) {
   if (reader.has("map")) {
     for (const JsonReader& text : reader.at("map").elements()) {
       rival.mappings.push_back(in_file(text, [&] { return AxisMapping::parse(text.text()); }));
-      in_file(text, [&] { return values.info(rival.mappings.back().parameter); });
+      const AxisMapping& mapping = rival.mappings.back();
+      const auto axis = std::ranges::find(axes, mapping.axis, &Axis::name);
+      if (axis == axes.end()) {
+        throw text.error("the recipe has no axis '" + mapping.axis + "'", "map one of $.axes");
+      }
+      in_file(text, [&] {
+        for (const double v : axis->values) ParameterValues(values).set(mapping.parameter, mapping.apply(v));
+        return 0;
+      });
     }
   }
   if (reader.has("free_per_row")) {
@@ -69,18 +77,21 @@ Rival read_rival(const JsonReader& reader) {
   return rival;
 }
 
-RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_values) {
+RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_values, const std::vector<Axis>& axes) {
   reader.allow({"name", "views", "model", "reference", "grid", "metric", "weights", "free"});
   RecipeRow row;
   row.model = reader.has("model") ? reader.at("model").text() : recipe_values.owner();
   const ParameterValues model_values =
       reader.has("model") ? in_file(reader.at("model"), [&] { return find_model(row.model).defaults(); }) : recipe_values;
-  if (model_values.flat().size() != recipe_values.flat().size()) {
+  if (!std::ranges::equal(model_values.list(), recipe_values.list(), {}, &ParameterInfo::name, &ParameterInfo::name)) {
     throw reader.at("model").error("'" + row.model + "' has other parameters than " + recipe_values.owner(),
                                    "name a variant of the recipe's model");
   }
   row.name = reader.at("name").text();
   row.views = reader.at("views").text();
+  if (row.views != "all" && row.views != "normal_slice") {
+    throw reader.at("views").error("unknown views '" + row.views + "'", "choose all or normal_slice");
+  }
   const JsonReader reference = reader.at("reference");
   reference.allow({"name", "set"});
   row.reference = reference.at("name").text();
@@ -92,14 +103,26 @@ RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_value
     row.grid = in_file(grid, [&] { return Grid::named_or_file(row.grid_name); });
   } else {
     row.grid_name = row.name;
-    row.grid = Grid::from_json(grid.value(), grid.path());
+    row.grid = Grid::from_json(grid);
+  }
+  if (row.views == "normal_slice" && row.grid.theta_o.values != std::vector{0.0}) {
+    throw grid.error("a normal_slice has views that are not normal", "write \"theta_o\": [0]");
   }
   row.quantity = in_file(reader.at("metric"), [&] { return parse_quantity(reader.at("metric").text()); });
   row.weights = in_file(reader.at("weights"), [&] { return parse_weights(reader.at("weights").text()); });
+  if (std::ranges::find(row.weights, WeightFactor::inverse_variance) != row.weights.end()) {
+    throw reader.at("weights").error("exact tables have no variance", "leave out inverse_variance");
+  }
   for (const JsonReader& set : reader.at("free").elements()) {
     std::vector<std::string> names;
     for (const JsonReader& name : set.elements()) {
       in_file(name, [&] { return model_values.info(name.text()); });
+      if (std::ranges::find(axes, name.text(), &Axis::name) != axes.end()) {
+        throw name.error("'" + name.text() + "' is an axis", "an axis can't be free; leave it out");
+      }
+      if (std::ranges::find(names, name.text()) != names.end()) {
+        throw set.error("'" + name.text() + "' is free twice", "name it once");
+      }
       names.push_back(name.text());
     }
     row.free_sets.push_back(names);
@@ -196,9 +219,15 @@ Recipe Recipe::read(const std::filesystem::path& path) {
     recipe.description = reader.at("description").text();
     recipe.model = reader.at("model").text();
     recipe.fixed = in_file(reader.at("model"), [&] { return find_model(recipe.model).defaults(); });
-    if (reader.has("fixed")) set_parameters(recipe.fixed, reader.at("fixed"));
+    if (reader.has("fixed")) {
+      set_parameters(recipe.fixed, reader.at("fixed"));
+      for (const auto& [name, member] : reader.at("fixed").members()) recipe.fixed_names.push_back(name);
+    }
     for (const auto& [name, member] : reader.at("published").members()) {
-      in_file(member, [&] { return recipe.fixed.info(name); });
+      in_file(member, [&] {
+        ParameterValues(recipe.fixed).set(name, member.number());
+        return 0;
+      });
       recipe.published.emplace_back(name, member.number());
     }
     for (const auto& [name, member] : reader.at("axes").members()) {
@@ -220,15 +249,24 @@ Recipe Recipe::read(const std::filesystem::path& path) {
     }
     recipe.tolerance = reader.at("tolerance").number();
     if (reader.has("rivals")) {
-      for (const JsonReader& rival : reader.at("rivals").elements()) recipe.rivals.push_back(read_rival(rival));
+      for (const JsonReader& rival : reader.at("rivals").elements()) recipe.rivals.push_back(read_rival(rival, recipe.parameter_axes));
     }
-    for (const JsonReader& row : reader.at("rows").elements()) recipe.rows.push_back(read_row(row, recipe.fixed));
+    for (const JsonReader& row : reader.at("rows").elements()) recipe.rows.push_back(read_row(row, recipe.fixed, recipe.parameter_axes));
     if (recipe.rows.empty()) throw reader.at("rows").error("the list is empty", "give at least one row");
     for (std::size_t i = 0; i < recipe.rows.size(); ++i) {
       const JsonReader row = reader.at("rows").elements()[i];
+      for (std::size_t j = 0; j < i; ++j) {
+        if (recipe.rows[j].name == recipe.rows[i].name) {
+          throw row.at("name").error("two rows are called '" + recipe.rows[i].name + "'", "names become file names: change one");
+        }
+      }
       if (recipe.rows[i].free_sets.empty()) throw row.at("free").error("the list is empty", "name the parameters to refit");
       for (const Axis& axis : recipe.parameter_axes) {
-        in_file(reader.at("axes").at(axis.name), [&] {
+        const JsonReader place = reader.at("axes").at(axis.name);
+        if (in_file(place, [&] { return !recipe.rows[i].reference_values.info(axis.name).choices.empty(); })) {
+          throw place.error("'" + axis.name + "' is a choice, not a number", "make one row per choice");
+        }
+        in_file(place, [&] {
           for (const double value : axis.values) ParameterValues(recipe.rows[i].reference_values).set(axis.name, value);
           return 0;
         });
@@ -268,7 +306,9 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
       const std::vector<double> weights = entry_weights(table, row.weights, row.quantity);
 
       ParameterValues published = with_table_parameters(model.defaults(), table);
-      for (const ParameterInfo& info : recipe.fixed.list()) published.set(info.name, recipe.fixed.components(info));
+      for (const std::string& name : recipe.fixed_names) {
+        published.set(name, recipe.fixed.components(recipe.fixed.info(name)));
+      }
       for (const auto& [name, value] : recipe.published) published.set(name, value);
       const std::vector<float> published_values = TableModel(model, published, table).render().values;
       std::vector<RivalScore> rivals;

@@ -5,7 +5,7 @@
 
 namespace lobefit {
 
-/// √(1-|x|) times a polynomial, reflected for x < 0; absolute error below 2e-8 (Abramowitz, Stegun 1964, 4.4.46).
+/// √(1-|x|) times a polynomial, reflected for x < 0; absolute error below 2.2e-8 (Abramowitz, Stegun 1964, 4.4.46).
 struct ArcCosine {
   static constexpr const char* name = "acos";
   static constexpr std::array arguments{"x"};

@@ -68,8 +68,9 @@ void check_angles(const JsonReader& reader, double upper, bool closed) {
   }
 }
 
-Grid Grid::from_json(const Json& json, const std::string& place) {
-  const JsonReader reader(json, place);
+Grid Grid::from_json(const Json& json, const std::string& place) { return from_json(JsonReader(json, place)); }
+
+Grid Grid::from_json(const JsonReader& reader) {
   reader.allow({"theta_i", "theta_o", "phi", "midpoints"});
   const bool midpoints = reader.has("midpoints") && reader.at("midpoints").boolean();
   const auto axis = [&](const char* name, double upper, bool closed) {

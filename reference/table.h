@@ -17,6 +17,7 @@
 namespace lobefit {
 
 using Json = nlohmann::ordered_json;
+class JsonReader;
 
 struct Axis {
   std::string name;
@@ -35,8 +36,9 @@ struct Grid {
 
   /// "small" (9 × 9 × 10), "default" (18 × 18 × 19), "fine" (36 × 36 × 37), or a JSON file of angles.
   static Grid named_or_file(const std::string& name);
-  /// From {"theta_i": […], "theta_o": […], "phi": […], "midpoints": false}; `place` names it in errors.
+  /// From {"theta_i": […], "theta_o": […], "phi": […], "midpoints": false}; `place` names the file in errors.
   static Grid from_json(const Json& json, const std::string& place);
+  static Grid from_json(const JsonReader& reader);
 };
 
 struct Table {

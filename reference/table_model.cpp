@@ -29,6 +29,8 @@ AxisMapping AxisMapping::parse(std::string_view text) {
   return mapping;
 }
 
+double AxisMapping::apply(double coordinate) const { return scale * std::pow(coordinate, power); }
+
 TableModel::TableModel(const Model& model, const ParameterValues& values, const Table& table,
                        const std::vector<AxisMapping>& mappings)
     : model_(&model), table_(&table), set_by_axis_(values.flat().size(), false) {
@@ -60,7 +62,7 @@ TableModel::TableModel(const Model& model, const ParameterValues& values, const 
                     "`lobefit table info` lists its axes");
       }
       const double coordinate = coordinates[static_cast<std::size_t>(axis - table.parameter_axes.begin())];
-      at_row.set(mapping.parameter, mapping.scale * std::pow(coordinate, mapping.power));
+      at_row.set(mapping.parameter, mapping.apply(coordinate));
     }
     rows_.emplace_back(at_row.flat().begin(), at_row.flat().end());
   }

@@ -15,6 +15,7 @@ struct AxisMapping {
   std::string parameter, axis;
   double scale = 1.0, power = 1.0;
 
+  double apply(double coordinate) const;
   /// From "NAME=SCALE*AXIS^POWER", scale and power optional: "roughness=0.4*alpha^0.5". Throws Error(usage).
   static AxisMapping parse(std::string_view text);
 };

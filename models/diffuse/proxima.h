@@ -34,7 +34,8 @@ constexpr void describe_proxima(P& p, Visit&& visit) {
                            .doc = "Constant part of the roughness term."});
   visit(p.b, ParameterInfo{.name = "b", .lower = -2.0, .upper = 2.0, .initial = 0.19, .tier = Tier::full,
                            .doc = "Part of the roughness term that grows as 1/cos theta_i."});
-  visit(p.exponent, ParameterInfo{.name = "exponent", .symbol = "e", .lower = 0.05, .upper = 16.0, .initial = 0.5,
+  // Below 0.2 the guarded pow(0, e) would no longer vanish.
+  visit(p.exponent, ParameterInfo{.name = "exponent", .symbol = "e", .lower = 0.2, .upper = 16.0, .initial = 0.5,
                                   .tier = Tier::full, .doc = "Exponent of the fade in cos theta_k = -dot(V, L)."});
 }
 
