@@ -80,8 +80,8 @@ const FittedVariable& estimate(const Fit& fit, std::string_view name) {
 class ProximaOnShadowedFacets : public ::testing::Test {
  protected:
   Table render(const RenderOptions& options) const {
-    return lobefit::render(reference_, reference_.defaults(), {Axis{"alpha", "", {0.3, 0.6, 1.0}, false}}, grid(), options,
-                           silent);
+    return lobefit::render(reference_, reference_.defaults(), {Axis{"alpha", "", {0.3, 0.6, 1.0}, false}}, grid(),
+                           options, silent);
   }
   Fit fit(const Table& table, Quantity quantity = Quantity::cosine) const {
     return lobefit::fit(model_, model_.defaults(), table, {.free = {"a", "b"}, .quantity = quantity}, silent);
@@ -151,8 +151,8 @@ TEST(KnownConstants, WithGaussianNoiseOfKnownSize) {
         table.values[entry] += static_cast<float>(error * noise);
         table.stderr_values[entry] = static_cast<float>(error);
       }
-      const Fit result = fit(model, model.defaults(), table,
-                             {.free = {"a", "b", "exponent"}, .quantity = quantity}, silent);
+      const Fit result =
+          fit(model, model.defaults(), table, {.free = {"a", "b", "exponent"}, .quantity = quantity}, silent);
       ASSERT_TRUE(result.solution.identifiable);
       a.add(estimate(result, "a"));
       b.add(estimate(result, "b"));

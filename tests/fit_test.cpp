@@ -63,8 +63,8 @@ Table lambertian_table(F&& albedo, const Grid& grid = small_grid()) {
 }
 
 const FitParameter& parameter(const Fit& fit, std::string_view name) {
-  const auto found = std::find_if(fit.parameters.begin(), fit.parameters.end(),
-                                  [&](const FitParameter& p) { return p.name == name; });
+  const auto found =
+      std::find_if(fit.parameters.begin(), fit.parameters.end(), [&](const FitParameter& p) { return p.name == name; });
   if (found == fit.parameters.end()) throw std::runtime_error("no parameter " + std::string(name));
   return *found;
 }
@@ -103,31 +103,32 @@ struct Observation {
 // NIST Statistical Reference Datasets, nonlinear regression, Kirby2 (R. Kirby, NIST: scanning electron microscope line
 // width standards; average difficulty), https://www.itl.nist.gov/div898/strd/nls/data/kirby2.shtml
 constexpr Observation kirby2[] = {
-    {9.65, 0.0082}, {10.74, 0.0112}, {11.81, 0.0149}, {12.88, 0.0198}, {14.06, 0.0248}, {15.28, 0.0324},
-    {16.63, 0.042}, {18.19, 0.0549}, {19.88, 0.0719}, {21.84, 0.0963}, {24, 0.1291}, {26.25, 0.171},
-    {28.86, 0.2314}, {31.85, 0.3227}, {35.79, 0.4809}, {40.18, 0.7084}, {44.74, 1.022}, {49.53, 1.458},
-    {53.94, 1.952}, {58.29, 2.541}, {62.63, 3.223}, {67.03, 3.999}, {71.25, 4.852}, {75.22, 5.732}, {79.33, 6.727},
-    {83.56, 7.835}, {87.75, 9.025}, {91.93, 10.267}, {96.1, 11.578}, {100.28, 12.944}, {104.46, 14.377},
-    {108.66, 15.856}, {112.71, 17.331}, {116.88, 18.885}, {121.33, 20.575}, {125.79, 22.32}, {125.79, 22.303},
-    {128.74, 23.46}, {130.27, 24.06}, {133.33, 25.272}, {134.79, 25.853}, {137.93, 27.11}, {139.33, 27.658},
-    {142.46, 28.924}, {143.9, 29.511}, {146.91, 30.71}, {148.51, 31.35}, {151.41, 32.52}, {153.17, 33.23},
-    {155.97, 34.33}, {157.76, 35.06}, {160.56, 36.17}, {162.3, 36.84}, {165.21, 38.01}, {166.9, 38.67},
-    {169.92, 39.87}, {170.32, 40.03}, {171.54, 40.5}, {173.79, 41.37}, {174.57, 41.67}, {176.25, 42.31},
-    {177.34, 42.73}, {179.19, 43.46}, {181.02, 44.14}, {182.08, 44.55}, {183.88, 45.22}, {185.75, 45.92},
-    {186.8, 46.3}, {188.63, 47}, {190.45, 47.68}, {191.48, 48.06}, {193.35, 48.74}, {195.22, 49.41},
-    {196.23, 49.76}, {198.05, 50.43}, {199.97, 51.11}, {201.06, 51.5}, {202.83, 52.12}, {204.69, 52.76},
-    {205.86, 53.18}, {207.58, 53.78}, {209.5, 54.46}, {210.65, 54.83}, {212.33, 55.4}, {215.43, 56.43},
-    {217.16, 57.03}, {220.21, 58}, {221.98, 58.61}, {225.06, 59.58}, {226.79, 60.11}, {229.92, 61.1},
-    {231.69, 61.65}, {234.77, 62.59}, {236.6, 63.12}, {239.63, 64.03}, {241.5, 64.62}, {244.48, 65.49},
-    {246.4, 66.03}, {249.35, 66.89}, {251.32, 67.42}, {254.22, 68.23}, {256.24, 68.77}, {259.11, 69.59},
-    {261.18, 70.11}, {264.02, 70.86}, {266.13, 71.43}, {268.94, 72.16}, {271.09, 72.7}, {273.87, 73.4},
-    {276.08, 73.93}, {278.83, 74.6}, {281.08, 75.16}, {283.81, 75.82}, {286.11, 76.34}, {288.81, 76.98},
-    {291.08, 77.48}, {293.75, 78.08}, {295.99, 78.6}, {298.64, 79.17}, {300.84, 79.62}, {302.02, 79.88},
-    {303.48, 80.19}, {305.65, 80.66}, {308.27, 81.22}, {310.41, 81.66}, {313.01, 82.16}, {315.12, 82.59},
-    {317.71, 83.14}, {319.79, 83.5}, {322.36, 84}, {324.42, 84.4}, {326.98, 84.89}, {329.01, 85.26},
-    {331.56, 85.74}, {333.56, 86.07}, {336.1, 86.54}, {338.08, 86.89}, {340.6, 87.32}, {342.57, 87.65},
-    {345.08, 88.1}, {347.02, 88.43}, {349.52, 88.83}, {351.44, 89.12}, {353.93, 89.54}, {355.83, 89.85},
-    {358.32, 90.25}, {360.2, 90.55}, {362.67, 90.93}, {364.53, 91.2}, {367, 91.55}, {371.3, 92.2}};
+    {9.65, 0.0082},   {10.74, 0.0112},  {11.81, 0.0149},  {12.88, 0.0198},  {14.06, 0.0248},  {15.28, 0.0324},
+    {16.63, 0.042},   {18.19, 0.0549},  {19.88, 0.0719},  {21.84, 0.0963},  {24, 0.1291},     {26.25, 0.171},
+    {28.86, 0.2314},  {31.85, 0.3227},  {35.79, 0.4809},  {40.18, 0.7084},  {44.74, 1.022},   {49.53, 1.458},
+    {53.94, 1.952},   {58.29, 2.541},   {62.63, 3.223},   {67.03, 3.999},   {71.25, 4.852},   {75.22, 5.732},
+    {79.33, 6.727},   {83.56, 7.835},   {87.75, 9.025},   {91.93, 10.267},  {96.1, 11.578},   {100.28, 12.944},
+    {104.46, 14.377}, {108.66, 15.856}, {112.71, 17.331}, {116.88, 18.885}, {121.33, 20.575}, {125.79, 22.32},
+    {125.79, 22.303}, {128.74, 23.46},  {130.27, 24.06},  {133.33, 25.272}, {134.79, 25.853}, {137.93, 27.11},
+    {139.33, 27.658}, {142.46, 28.924}, {143.9, 29.511},  {146.91, 30.71},  {148.51, 31.35},  {151.41, 32.52},
+    {153.17, 33.23},  {155.97, 34.33},  {157.76, 35.06},  {160.56, 36.17},  {162.3, 36.84},   {165.21, 38.01},
+    {166.9, 38.67},   {169.92, 39.87},  {170.32, 40.03},  {171.54, 40.5},   {173.79, 41.37},  {174.57, 41.67},
+    {176.25, 42.31},  {177.34, 42.73},  {179.19, 43.46},  {181.02, 44.14},  {182.08, 44.55},  {183.88, 45.22},
+    {185.75, 45.92},  {186.8, 46.3},    {188.63, 47},     {190.45, 47.68},  {191.48, 48.06},  {193.35, 48.74},
+    {195.22, 49.41},  {196.23, 49.76},  {198.05, 50.43},  {199.97, 51.11},  {201.06, 51.5},   {202.83, 52.12},
+    {204.69, 52.76},  {205.86, 53.18},  {207.58, 53.78},  {209.5, 54.46},   {210.65, 54.83},  {212.33, 55.4},
+    {215.43, 56.43},  {217.16, 57.03},  {220.21, 58},     {221.98, 58.61},  {225.06, 59.58},  {226.79, 60.11},
+    {229.92, 61.1},   {231.69, 61.65},  {234.77, 62.59},  {236.6, 63.12},   {239.63, 64.03},  {241.5, 64.62},
+    {244.48, 65.49},  {246.4, 66.03},   {249.35, 66.89},  {251.32, 67.42},  {254.22, 68.23},  {256.24, 68.77},
+    {259.11, 69.59},  {261.18, 70.11},  {264.02, 70.86},  {266.13, 71.43},  {268.94, 72.16},  {271.09, 72.7},
+    {273.87, 73.4},   {276.08, 73.93},  {278.83, 74.6},   {281.08, 75.16},  {283.81, 75.82},  {286.11, 76.34},
+    {288.81, 76.98},  {291.08, 77.48},  {293.75, 78.08},  {295.99, 78.6},   {298.64, 79.17},  {300.84, 79.62},
+    {302.02, 79.88},  {303.48, 80.19},  {305.65, 80.66},  {308.27, 81.22},  {310.41, 81.66},  {313.01, 82.16},
+    {315.12, 82.59},  {317.71, 83.14},  {319.79, 83.5},   {322.36, 84},     {324.42, 84.4},   {326.98, 84.89},
+    {329.01, 85.26},  {331.56, 85.74},  {333.56, 86.07},  {336.1, 86.54},   {338.08, 86.89},  {340.6, 87.32},
+    {342.57, 87.65},  {345.08, 88.1},   {347.02, 88.43},  {349.52, 88.83},  {351.44, 89.12},  {353.93, 89.54},
+    {355.83, 89.85},  {358.32, 90.25},  {360.2, 90.55},   {362.67, 90.93},  {364.53, 91.2},   {367, 91.55},
+    {371.3, 92.2}};
 
 struct CertifiedParameter {
   double value, standard_deviation;
@@ -164,8 +165,8 @@ LeastSquaresProblem kirby2_problem(std::vector<double> start) {
 
 TEST(LeastSquares, MeetsTheCertifiedResultOfKirby2) {
   double worst_value = 0.0, worst_deviation = 0.0;
-  for (const std::vector<double>& start : {std::vector{2.0, -0.1, 0.003, -0.001, 0.00001},
-                                           std::vector{1.5, -0.15, 0.0025, -0.0015, 0.00002}}) {
+  for (const std::vector<double>& start :
+       {std::vector{2.0, -0.1, 0.003, -0.001, 0.00001}, std::vector{1.5, -0.15, 0.0025, -0.0015, 0.00002}}) {
     const LeastSquaresSolution solution = solve(kirby2_problem(start), silent);
     EXPECT_TRUE(solution.converged) << solution.termination;
     EXPECT_TRUE(solution.identifiable) << remarks(solution);
@@ -296,7 +297,8 @@ TEST(Fits, EndWhereTheirMetricIsStationary) {
   for (const Quantity quantity : {Quantity::cosine, Quantity::brdf, Quantity::log, Quantity::cube_root}) {
     for (const char* weight_text : {"uniform", "sin_theta_i,sin_theta_o,cos_theta_i", "quadrature"}) {
       const std::vector<WeightFactor> factors = parse_weights(weight_text);
-      const Fit result = fit(model, start, table, {.free = {"a", "b"}, .quantity = quantity, .weights = factors}, silent);
+      const Fit result =
+          fit(model, start, table, {.free = {"a", "b"}, .quantity = quantity, .weights = factors}, silent);
       ASSERT_TRUE(result.solution.converged) << result.solution.termination;
       const std::vector<double> weights = entry_weights(table, factors, quantity);
       const auto objective = [&](double a, double b) {
@@ -338,8 +340,8 @@ TEST(Fits, OfLambertAreMeans) {
   table.valid[3] = table.valid[40] = 0;
   const Model& model = find_model("lambert");
   for (const bool by_variance : {false, true}) {
-    const std::vector<WeightFactor> factors = by_variance ? std::vector{WeightFactor::inverse_variance}
-                                                          : std::vector<WeightFactor>{};
+    const std::vector<WeightFactor> factors =
+        by_variance ? std::vector{WeightFactor::inverse_variance} : std::vector<WeightFactor>{};
     const Fit result = fit(model, model.defaults(), table,
                            {.free = {"albedo"}, .quantity = Quantity::brdf, .weights = factors}, silent);
     double weight_sum = 0.0, mean = 0.0, variance = 0.0, squares = 0.0, count = 0.0;
@@ -399,8 +401,8 @@ TEST(Fits, TakeCorrelatedErrorsFromReplicates) {
 }
 
 TEST(Fits, OfUnclampedProximaAreLinearLeastSquares) {
-  // On the slice V = N the fade is 1 and f μi π - μi = a α μi + b α: two columns, solved by Eigen. formulas.md §2 has the
-  // result for Smith-correlated masking.
+  // On the slice V = N the fade is 1 and f μi π - μi = a α μi + b α: two columns, solved by Eigen. formulas.md §2 has
+  // the result for Smith-correlated masking.
   const Table table = render_reference("correlated", {alphas(20)}, normal_slice());
   const auto n = static_cast<Eigen::Index>(table.entries());
   Eigen::MatrixXd columns(n, 2);
@@ -426,7 +428,8 @@ TEST(Fits, OfUnclampedProximaAreLinearLeastSquares) {
   const double variance = residual * residual * static_cast<double>(n) / static_cast<double>(n - 2);
   EXPECT_NEAR(parameter(result, "a").estimate.misfit_standard_error, std::sqrt(variance * covariance(0, 0)), 1e-9);
   EXPECT_NEAR(parameter(result, "b").estimate.misfit_standard_error, std::sqrt(variance * covariance(1, 1)), 1e-9);
-  EXPECT_NEAR(result.solution.correlation[0][1], covariance(0, 1) / std::sqrt(covariance(0, 0) * covariance(1, 1)), 1e-9);
+  EXPECT_NEAR(result.solution.correlation[0][1], covariance(0, 1) / std::sqrt(covariance(0, 0) * covariance(1, 1)),
+              1e-9);
   EXPECT_EQ(result.solution.correlation[0][0], 1.0);
   // An exact table has no error of its own.
   EXPECT_EQ(parameter(result, "a").estimate.standard_error, 0.0);
@@ -476,7 +479,8 @@ TEST(Fits, GiveKnownConstantsBack) {
 
 TEST(Fits, FollowTheAxesOfTheTable) {
   // The table's alpha drives the model's roughness: only the albedo is left.
-  Table table = render_model("burley", find_model("burley").defaults(), small_grid(), {{"roughness", "", {0.2, 0.6, 1.0}, false}});
+  Table table = render_model("burley", find_model("burley").defaults(), small_grid(),
+                             {{"roughness", "", {0.2, 0.6, 1.0}, false}});
   table.parameter_axes[0] = {"alpha", "", {0.04, 0.36, 1.0}, false};
   ParameterValues start = find_model("burley").defaults();
   start.set("albedo", 0.2);
@@ -547,8 +551,9 @@ TEST(Fits, NameParametersWithoutEffect) {
   EXPECT_TRUE(without.solution.identifiable);
   EXPECT_NEAR(value(with, "a"), value(without, "a"), 1e-9);
   EXPECT_NEAR(value(with, "b"), value(without, "b"), 1e-9);
-  EXPECT_NEAR(parameter(with, "a").estimate.misfit_standard_error / parameter(without, "a").estimate.misfit_standard_error,
-              1.0, 0.01);
+  EXPECT_NEAR(
+      parameter(with, "a").estimate.misfit_standard_error / parameter(without, "a").estimate.misfit_standard_error, 1.0,
+      0.01);
   EXPECT_EQ(with.json("", "")["identifiable"], false);
   EXPECT_EQ(with.json("", "")["params"].back()["identifiable"], false);
 }
@@ -567,7 +572,8 @@ TEST(Fits, NameCombinationsThatTheDataLeaveOpen) {
   EXPECT_NEAR(value(result, "alpha") * value(result, "a"), 0.5 * -0.55, 1e-5);
   EXPECT_NEAR(value(result, "alpha") * value(result, "b"), 0.5 * 0.19, 1e-5);
   // The exponent does not take part in it.
-  const Fit four = fit(model, values, table, {.free = {"alpha", "a", "b", "exponent"}, .quantity = Quantity::cosine}, silent);
+  const Fit four =
+      fit(model, values, table, {.free = {"alpha", "a", "b", "exponent"}, .quantity = Quantity::cosine}, silent);
   EXPECT_TRUE(parameter(four, "exponent").estimate.identifiable) << remarks(four.solution);
   EXPECT_FALSE(parameter(four, "a").estimate.identifiable);
 }
@@ -581,8 +587,9 @@ TEST(Fits, NameCombinationsThatEndAtABound) {
   values.set("roughness", 0.8);
   values.set("multiple_scattering", 0.6);
   const Table table = render_model("chan_2024", values);
-  const Fit result = fit(model, model.defaults(), table,
-                         {.free = {"albedo", "roughness", "multiple_scattering"}, .quantity = Quantity::cosine}, silent);
+  const Fit result =
+      fit(model, model.defaults(), table,
+          {.free = {"albedo", "roughness", "multiple_scattering"}, .quantity = Quantity::cosine}, silent);
   EXPECT_LT(std::sqrt(result.solution.sum_of_squares), 1e-6);
   EXPECT_FALSE(result.solution.identifiable) << "albedo " << value(result, "albedo") << " is not 0.5";
 }
@@ -601,7 +608,8 @@ TEST(Fits, ReportEveryVariableWithoutEffect) {
 
 TEST(Fits, HoldOutWhatTheyDoNotSee) {
   UniformNumbers uniform(8);
-  const Table table = lambertian_table([&](std::size_t) { return uniform.between(0.2, 0.8); }, Grid::named_or_file("small"));
+  const Table table =
+      lambertian_table([&](std::size_t) { return uniform.between(0.2, 0.8); }, Grid::named_or_file("small"));
   const auto entries = static_cast<double>(table.entries());
   const Model& model = find_model("lambert");
   FitOptions options{.free = {"albedo"}, .quantity = Quantity::brdf, .holdout = 0.3};
@@ -623,9 +631,8 @@ TEST(Fits, HoldOutWhatTheyDoNotSee) {
   EXPECT_NE(value(whole, "albedo"), value(result, "albedo"));
   options.seed = 2;
   EXPECT_NE(value(fit(model, model.defaults(), table, options, silent), "albedo"), value(result, "albedo"));
-  expect_error(ExitCode::usage, "--holdout", [&] {
-    fit(model, model.defaults(), table, {.free = {"albedo"}, .holdout = 1.0}, silent);
-  });
+  expect_error(ExitCode::usage, "--holdout",
+               [&] { fit(model, model.defaults(), table, {.free = {"albedo"}, .holdout = 1.0}, silent); });
 }
 
 TEST(Fits, OfAnExactModelPredictWhatIsHeldOut) {
@@ -670,7 +677,9 @@ TEST(Fits, FindTheBetterValleyWithMoreStarts) {
 }
 
 /// A table of albedo 0.5 in which every tenth entry says 0.9.
-Table table_with_outliers() { return lambertian_table([](std::size_t entry) { return entry % 10 == 0 ? 0.9 : 0.5; }); }
+Table table_with_outliers() {
+  return lambertian_table([](std::size_t entry) { return entry % 10 == 0 ? 0.9 : 0.5; });
+}
 
 TEST(Fits, RobustLossesResistOutliers) {
   const Table table = table_with_outliers();
@@ -707,8 +716,9 @@ TEST(Fits, RobustErrorsAreThoseOfTheRobustEstimate) {
   double inliers = 0.0;
   for (std::size_t entry = 0; entry < table.entries(); ++entry) inliers += entry % 10 == 0 ? 0.0 : 1.0;
   const Model& model = find_model("lambert");
-  const Fit result = fit(model, model.defaults(), table,
-                         {.free = {"albedo"}, .quantity = Quantity::brdf, .loss = Loss::huber, .loss_scale = 0.2}, silent);
+  const Fit result =
+      fit(model, model.defaults(), table,
+          {.free = {"albedo"}, .quantity = Quantity::brdf, .loss = Loss::huber, .loss_scale = 0.2}, silent);
   const double truth = 0.001 / std::sqrt(inliers), error = parameter(result, "albedo").estimate.standard_error;
   EXPECT_NEAR(error / truth, 1.0, 1e-3);
 }
@@ -725,7 +735,8 @@ TEST(Fits, RefuseWhatCannotBeFree) {
   expect_error(ExitCode::usage, "axis", [&] { with({"a"}, {AxisMapping::parse("a=alpha")}); });
   Table masked = table;
   std::fill(masked.valid.begin(), masked.valid.end(), std::uint8_t{0});
-  expect_error(ExitCode::invalid_input, "masked", [&] { fit(model, model.defaults(), masked, {.free = {"a"}}, silent); });
+  expect_error(ExitCode::invalid_input, "masked",
+               [&] { fit(model, model.defaults(), masked, {.free = {"a"}}, silent); });
 }
 
 TEST(Fits, OfNothingScoreTheModelAsItIs) {
@@ -755,8 +766,8 @@ TEST(Fits, ReportWhenTheyAreInterrupted) {
 
 TEST(Fits, AreTheSameBitsForAnyNumberOfThreads) {
   // Several batches per parameter row.
-  const Table table = render_reference("correlated", {alphas(3)}, Grid::named_or_file("default"),
-                                       {.sampling = {.samples = 64}});
+  const Table table =
+      render_reference("correlated", {alphas(3)}, Grid::named_or_file("default"), {.sampling = {.samples = 64}});
   const Model& model = find_model("proxima");
   std::vector<std::string> documents;
   for (const std::size_t threads : {1, 2, 2}) {
@@ -785,7 +796,8 @@ TEST(FitFiles, HaveTheContractsFields) {
   EXPECT_EQ(json["model"], "burley");
   ASSERT_EQ(json["params"].size(), 4u);
   for (const Json& p : json["params"]) {
-    for (const char* field : {"name", "value", "stderr", "ci95", "misfit_stderr", "lower", "upper", "at_bound", "free"}) {
+    for (const char* field :
+         {"name", "value", "stderr", "ci95", "misfit_stderr", "lower", "upper", "at_bound", "free"}) {
       EXPECT_TRUE(p.contains(field)) << field;
     }
     EXPECT_EQ(p["ci95"].size(), 2u);
@@ -845,14 +857,18 @@ TEST(FitFiles, KeepWhatIsNotIdentifiable) {
 
 TEST(FitFiles, ComplaintsNameTheirPlace) {
   const Json good = example_fit().json("", "");
-  const Json scalar = Json::parse(fit(find_model("proxima"), find_model("proxima").defaults(),
-                                      render_model("proxima", find_model("proxima").defaults()), {.free = {"a"}}, silent)
-                                      .json("", "").dump());
+  const Json scalar =
+      Json::parse(fit(find_model("proxima"), find_model("proxima").defaults(),
+                      render_model("proxima", find_model("proxima").defaults()), {.free = {"a"}}, silent)
+                      .json("", "")
+                      .dump());
   ASSERT_NO_THROW(Fit::from_json(good, "fit.json"));
   ASSERT_NO_THROW(Fit::from_json(scalar, "fit.json"));
   const auto expect_refused = [](const Json& json, const std::string& fragment, const std::string& what) {
-    expect_error(ExitCode::invalid_input, fragment, [&] { Fit::from_json(json, "fit.json"); }, what);
-    expect_error(ExitCode::invalid_input, "fit.json", [&] { Fit::from_json(json, "fit.json"); }, what);
+    expect_error(
+        ExitCode::invalid_input, fragment, [&] { Fit::from_json(json, "fit.json"); }, what);
+    expect_error(
+        ExitCode::invalid_input, "fit.json", [&] { Fit::from_json(json, "fit.json"); }, what);
   };
   const auto broken = [](Json json, const char* pointer, const Json& replacement) {
     json[Json::json_pointer(pointer)] = replacement;
@@ -871,8 +887,7 @@ TEST(FitFiles, ComplaintsNameTheirPlace) {
   // Channels: of a number there are none, and of a colour three.
   expect_refused(broken(good, "/params/0/value", 7.0), "out of range", "red 7");
   expect_refused(broken(good, "/params/0/name", "albedo.x"), "albedo.x", "channel x");
-  expect_refused(broken(scalar, "/params/4/name", "exponent.b"),
-                 "exponent.b", "a channel of a number");
+  expect_refused(broken(scalar, "/params/4/name", "exponent.b"), "exponent.b", "a channel of a number");
 }
 
 }  // namespace

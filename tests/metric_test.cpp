@@ -47,7 +47,8 @@ Table make_table(const Grid& grid, int channels, F&& f) {
 }
 
 Grid coarse_grid() {
-  return {axis("theta_i", {0.0, 20.0, 50.0, 80.0}), axis("theta_o", {0.0, 45.0, 85.0}), axis("phi", {0.0, 60.0, 180.0})};
+  return {axis("theta_i", {0.0, 20.0, 50.0, 80.0}), axis("theta_o", {0.0, 45.0, 85.0}),
+          axis("phi", {0.0, 60.0, 180.0})};
 }
 
 template <class Act>
@@ -188,8 +189,9 @@ TEST(RmsDifference, OfAConstantOffsetHasItsClosedForm) {
     const std::vector<double> uniform = entry_weights(table, {}, Quantity::brdf);
     EXPECT_NEAR(rms_difference(table, values, Quantity::brdf, uniform), pi * offset, 1e-6);
     // π offset √(mean of cos²) over theta_i = 0, 20, 50, 80.
-    const double mean_square = (1.0 + std::pow(std::cos(pi / 9.0), 2) + std::pow(std::cos(pi / 3.6), 2) +
-                                std::pow(std::cos(pi / 2.25), 2)) / 4.0;
+    const double mean_square =
+        (1.0 + std::pow(std::cos(pi / 9.0), 2) + std::pow(std::cos(pi / 3.6), 2) + std::pow(std::cos(pi / 2.25), 2)) /
+        4.0;
     EXPECT_NEAR(rms_difference(table, values, Quantity::cosine, uniform), pi * offset * std::sqrt(mean_square), 1e-6);
     EXPECT_EQ(rms_difference(table, table.values, Quantity::log, uniform), 0.0);
   }
@@ -220,8 +222,8 @@ TEST(RmsDifference, DoesNotDependOnTheGridWithQuadratureWeights) {
       for (std::size_t entry = 0; entry < values.size(); ++entry) {
         values[entry] += static_cast<float>(offset * std::pow(table.wi(entry).z, 2));
       }
-      const double error =
-          std::abs(rms_difference(table, values, Quantity::brdf, entry_weights(table, factors, Quantity::brdf)) - truth);
+      const double error = std::abs(
+          rms_difference(table, values, Quantity::brdf, entry_weights(table, factors, Quantity::brdf)) - truth);
       EXPECT_LT(error, 0.4 * previous) << "second order: halving the step quarters the error";
       previous = error;
     }

@@ -148,8 +148,11 @@ TEST(ShippedRecipe, CoversWhatFormulasAskFor) {
     }
   }
   using Reading = std::pair<std::string, std::string>;
-  for (const Reading& reading : {Reading{"area_mean", "all"}, {"view_only", "normal_slice"}, {"none", "normal_slice"},
-                                 {"correlated", "normal_slice"}, {"correlated", "all"}}) {
+  for (const Reading& reading : {Reading{"area_mean", "all"},
+                                 {"view_only", "normal_slice"},
+                                 {"none", "normal_slice"},
+                                 {"correlated", "normal_slice"},
+                                 {"correlated", "all"}}) {
     EXPECT_TRUE(readings.contains(reading)) << reading.first << ", " << reading.second;
   }
   for (const Rival& rival : recipe.rivals) rivals.insert(rival.model);
@@ -213,7 +216,8 @@ TEST_F(Recipes, ReportWhatTheirTablesHold) {
     EXPECT_EQ(table.method, row.method);
     EXPECT_EQ(table.parameters["masking"], row.row->reference_values.choice("masking"));
     const std::vector<double> weights = entry_weights(table, row.row->weights, row.row->quantity);
-    const auto rms = [&](const std::string& model, ParameterValues values, const std::vector<AxisMapping>& mappings = {}) {
+    const auto rms = [&](const std::string& model, ParameterValues values,
+                         const std::vector<AxisMapping>& mappings = {}) {
       return rms_difference(table, TableModel(find_model(model), values, table, mappings).render().values,
                             row.row->quantity, weights);
     };

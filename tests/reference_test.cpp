@@ -139,11 +139,11 @@ double independent_kernel(Distribution distribution, double alpha, const Directi
       const double room = wo.z - p * along;
       const double last = across > 0.0 ? to_unit(room / across, scale) : (room > 0.0 ? edge : -edge);
       return stretch(u, alpha) * rule(-edge, last, [&](double v) {
-        const double q = to_slope(v, scale);
-        const double squared = p * p + q * q;
-        return stretch(v, scale) * slope_density(distribution, alpha, squared) / std::sqrt(1.0 + squared) *
-               std::max(wi.z - p * sine_i, 0.0) * std::max(room - q * across, 0.0);
-      });
+               const double q = to_slope(v, scale);
+               const double squared = p * p + q * q;
+               return stretch(v, scale) * slope_density(distribution, alpha, squared) / std::sqrt(1.0 + squared) *
+                      std::max(wi.z - p * sine_i, 0.0) * std::max(room - q * across, 0.0);
+             });
     });
   }
   return sum;
@@ -242,7 +242,8 @@ TEST(MicrofacetDiffuse, MeetsItsLimitWithoutShadowing) {
 }
 
 TEST(MicrofacetDiffuse, ViewsFromTheNormalAreNotMasked) {
-  // G1(n) = 1: view_only, none and the area mean are one there, and correlated and separable differ from them by G1(wi).
+  // G1(n) = 1: view_only, none and the area mean are one there, and correlated and separable differ from them by
+  // G1(wi).
   const Direction normal{0.0, 0.0, 1.0};
   for (const Distribution distribution : both_distributions) {
     for (const double alpha : {0.02, 0.3, 1.0}) {
@@ -354,9 +355,8 @@ TEST(MicrofacetDiffuse, MeetsPublishedDirectionalAlbedos) {
     std::array<double, 3> albedos;  // at 0, 60 and 85 degrees
   };
   // formulas.md §3: one bounce, five digits.
-  constexpr Row rows[] = {{0.25, {0.90612, 0.89476, 0.86236}},
-                          {0.5, {0.78045, 0.75584, 0.75109}},
-                          {1.0, {0.58192, 0.56504, 0.62972}}};
+  constexpr Row rows[] = {
+      {0.25, {0.90612, 0.89476, 0.86236}}, {0.5, {0.78045, 0.75584, 0.75109}}, {1.0, {0.58192, 0.56504, 0.62972}}};
   for (const Row& row : rows) {
     for (std::size_t i = 0; i < 3; ++i) {
       const Direction wo = from_degrees(std::array{0.0, 60.0, 85.0}[i], 0.0);
@@ -373,8 +373,8 @@ TEST(MicrofacetDiffuse, UnshadowedFacetsKeepTheirEnergy) {
     const ParameterValues values = surface(alpha, "view_only");
     double albedo = 0.0;
     for (const auto& [theta, weight] : gauss_legendre(40, 0.0, pi / 2.0)) {
-      albedo += 2.0 * pi * weight * std::sin(theta) * std::cos(theta) *
-                exact(values, direction(theta, 0.0), {0.0, 0.0, 1.0});
+      albedo +=
+          2.0 * pi * weight * std::sin(theta) * std::cos(theta) * exact(values, direction(theta, 0.0), {0.0, 0.0, 1.0});
     }
     EXPECT_NEAR(albedo, 0.5 * (1.0 + normal_incidence(alpha)), 1e-8) << "alpha " << alpha;
   }
@@ -458,8 +458,8 @@ TEST(VisibleNormals, FollowTheirDensity) {
         ASSERT_GT(bins, 20);
         const double p_value = boost::math::cdf(boost::math::complement(boost::math::chi_squared(bins - 1), statistic));
         smallest_p_value = std::min(smallest_p_value, p_value);
-        EXPECT_GT(p_value, false_alarm) << place(distribution, alpha, w, {}) << ": chi-squared " << statistic << " over "
-                                        << bins << " bins";
+        EXPECT_GT(p_value, false_alarm) << place(distribution, alpha, w, {}) << ": chi-squared " << statistic
+                                        << " over " << bins << " bins";
       }
     }
   }
@@ -592,8 +592,9 @@ TEST(MonteCarlo, FastRowsMeetThoseInDouble) {
   double worst = 0.0;
   for (int trial = 0; trial < 20; ++trial) {
     const Distribution distribution = both_distributions[static_cast<std::size_t>(trial) % 2];
-    const ParameterValues values = surface(std::pow(10.0, uniform.between(-1.5, 0.0)),
-                                           MicrofacetDiffuse::maskings[static_cast<std::size_t>(trial) % 5], distribution);
+    const ParameterValues values =
+        surface(std::pow(10.0, uniform.between(-1.5, 0.0)),
+                MicrofacetDiffuse::maskings[static_cast<std::size_t>(trial) % 5], distribution);
     std::vector<Direction> wi;
     for (const DirectionPair& pair : random_pairs(1 + static_cast<std::size_t>(trial) * 7, 42)) wi.push_back(pair.wi);
     const Direction wo = random_pairs(1, 43 + static_cast<std::uint64_t>(trial))[0].wo;
@@ -621,13 +622,13 @@ TEST(MonteCarlo, StopsAtTheTargetedError) {
       EXPECT_LE(result.stderr_f.x, target);
       EXPECT_EQ(result.samples % 512, 0u);
       // No sooner and no later: that many samples give that very estimate, half as many an error above the target.
-      const Estimate same = estimate(microfacet_diffuse(), values.flat(), wi, wo,
-                                     {.samples = result.samples, .sampler = sampler});
+      const Estimate same =
+          estimate(microfacet_diffuse(), values.flat(), wi, wo, {.samples = result.samples, .sampler = sampler});
       EXPECT_EQ(same.f.x, result.f.x);
       EXPECT_EQ(same.stderr_f.x, result.stderr_f.x);
       ASSERT_GT(result.samples, 512u);
-      const Estimate half = estimate(microfacet_diffuse(), values.flat(), wi, wo,
-                                     {.samples = result.samples / 2, .sampler = sampler});
+      const Estimate half =
+          estimate(microfacet_diffuse(), values.flat(), wi, wo, {.samples = result.samples / 2, .sampler = sampler});
       EXPECT_GT(half.stderr_f.x, target);
     }
   }

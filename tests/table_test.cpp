@@ -12,12 +12,12 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <atomic>
 #include <map>
 #include <set>
 #include <sstream>
@@ -38,9 +38,8 @@ namespace fs = std::filesystem;
 class TableFiles : public ::testing::Test {
  protected:
   TableFiles()
-      : folder_(fs::temp_directory_path() /
-                ("lobefit_" + std::to_string(getpid()) + "_" +
-                 ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+      : folder_(fs::temp_directory_path() / ("lobefit_" + std::to_string(getpid()) + "_" +
+                                             ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
     fs::create_directories(folder_);
   }
   ~TableFiles() override {
@@ -87,7 +86,8 @@ Axis axis(const std::string& name, std::vector<double> values, const std::string
 }
 
 Grid small_grid() {
-  return {axis("theta_i", {0.0, 20.0, 50.0, 80.0}), axis("theta_o", {0.0, 45.0, 85.0}), axis("phi", {0.0, 60.0, 180.0})};
+  return {axis("theta_i", {0.0, 20.0, 50.0, 80.0}), axis("theta_o", {0.0, 45.0, 85.0}),
+          axis("phi", {0.0, 60.0, 180.0})};
 }
 
 ParameterValues microfacet_diffuse(double alpha = 0.5) {
@@ -204,7 +204,8 @@ TEST(Grid, ComplaintsNameTheirPlace) {
            {"{\n\n\"theta_i\":[1e999]}", "g.json"},
            {"", "g.json"},
        }) {
-    expect_error(ExitCode::invalid_input, c.fragment, [&] { parse(c.text); }, c.text);
+    expect_error(
+        ExitCode::invalid_input, c.fragment, [&] { parse(c.text); }, c.text);
   }
   // NaN can't be written in JSON, but in a document made by a program.
   Json document{{"theta_i", {0.0, std::nan("")}}, {"theta_o", {0.0}}, {"phi", {0.0}}};
@@ -249,8 +250,8 @@ TEST(Table, EntriesLieWhereTheContractSays) {
             EXPECT_NEAR(degrees(std::acos(wi.z)), table.grid.theta_i.values[i], 1e-6);
             EXPECT_NEAR(degrees(std::acos(wo.z)), table.grid.theta_o.values[o], 1e-6);
             const double cos_phi = std::cos(radians(table.grid.phi.values[p]));
-            EXPECT_NEAR(dot(wi, wo) - wi.z * wo.z,
-                        cos_phi * std::sqrt((1.0 - wi.z * wi.z) * (1.0 - wo.z * wo.z)), 1e-12);
+            EXPECT_NEAR(dot(wi, wo) - wi.z * wo.z, cos_phi * std::sqrt((1.0 - wi.z * wi.z) * (1.0 - wo.z * wo.z)),
+                        1e-12);
           }
         }
       }
@@ -287,8 +288,8 @@ TEST_F(TableFiles, AreReadableAsPictures) {
     EXPECT_EQ(channel.channel().type, Imf::FLOAT);
   }
   EXPECT_EQ(names, (std::set<std::string>{"Y", "A", "stderr.Y"}));
-  for (const char* attribute : {"coordinates", "axes", "quantity", "reference", "params", "seed", "samples", "version",
-                                "command"}) {
+  for (const char* attribute :
+       {"coordinates", "axes", "quantity", "reference", "params", "seed", "samples", "version", "command"}) {
     EXPECT_NE(picture.header().findTypedAttribute<Imf::StringAttribute>(std::string("lobefit:") + attribute), nullptr)
         << attribute;
   }
@@ -309,7 +310,8 @@ TEST_F(TableFiles, AreReadableAsPictures) {
   Imf::FrameBuffer frame;
   for (const std::string& name : names) {
     planes[name].resize(width * height);
-    frame.insert(name, {Imf::FLOAT, reinterpret_cast<char*>(planes[name].data()), sizeof(float), sizeof(float) * width});
+    frame.insert(name,
+                 {Imf::FLOAT, reinterpret_cast<char*>(planes[name].data()), sizeof(float), sizeof(float) * width});
   }
   picture.setFrameBuffer(frame);
   picture.readPixels(0, static_cast<int>(height) - 1);
@@ -363,18 +365,19 @@ TEST_F(TableFiles, OddFloatsSurvive) {
 TEST_F(TableFiles, ConstantTablesRoundTrip) {
   // Nothing packs better: the file is hundreds of times smaller than its pixels, and still no fraud.
   Monitor monitor;
-  const Table table = render(find_model("lambert"), find_model("lambert").defaults(), {}, Grid::named_or_file("fine"), monitor);
+  const Table table =
+      render(find_model("lambert"), find_model("lambert").defaults(), {}, Grid::named_or_file("fine"), monitor);
   table.write(file("t.exr"));
   EXPECT_LT(fs::file_size(file("t.exr")) * 20, 12 * table.entries());
   expect_same(table, Table::read(file("t.exr")));
 }
 
 TEST_F(TableFiles, RendersAreTheSameBytesForAnyNumberOfThreads) {
-  for (const RenderOptions& options : {RenderOptions{.sampling = {.samples = 640}},
-                                       RenderOptions{.sampling = {.samples = 320}, .shared_facets = false},
-                                       RenderOptions{.sampling = {.samples = 320, .stderr_target = 5e-3}},
-                                       RenderOptions{.sampling = {.samples = 320, .sampler = Sampler::philox}},
-                                       RenderOptions{.exact = true}}) {
+  for (const RenderOptions& options :
+       {RenderOptions{.sampling = {.samples = 640}},
+        RenderOptions{.sampling = {.samples = 320}, .shared_facets = false},
+        RenderOptions{.sampling = {.samples = 320, .stderr_target = 5e-3}},
+        RenderOptions{.sampling = {.samples = 320, .sampler = Sampler::philox}}, RenderOptions{.exact = true}}) {
     std::vector<std::string> files;
     for (const std::size_t threads : {1, 2, 2, 1}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -386,7 +389,9 @@ TEST_F(TableFiles, RendersAreTheSameBytesForAnyNumberOfThreads) {
 }
 
 TEST(Table, SeedsAndSamplersMakeDifferentTables) {
-  const auto values = [](SamplingOptions sampling) { return monte_carlo(microfacet_diffuse(), {.sampling = sampling}).values; };
+  const auto values = [](SamplingOptions sampling) {
+    return monte_carlo(microfacet_diffuse(), {.sampling = sampling}).values;
+  };
   const std::vector<float> first = values({.samples = 320, .seed = 1});
   EXPECT_EQ(first, values({.samples = 320, .seed = 1}));
   EXPECT_NE(first, values({.samples = 320, .seed = 2}));
@@ -406,8 +411,8 @@ TEST(Table, ExactRendersHoldTheReferencesValues) {
 
 TEST(Table, AdaptiveSamplingMeetsItsTargetEverywhere) {
   for (const bool shared : {true, false}) {
-    const Table table = monte_carlo(microfacet_diffuse(), {.sampling = {.samples = 64, .stderr_target = 2e-3},
-                                                           .shared_facets = shared});
+    const Table table = monte_carlo(microfacet_diffuse(),
+                                    {.sampling = {.samples = 64, .stderr_target = 2e-3}, .shared_facets = shared});
     ASSERT_EQ(table.sample_counts.size(), table.entries());
     std::set<float> counts;
     for (std::size_t entry = 0; entry < table.entries(); ++entry) {
@@ -489,9 +494,9 @@ TEST(Table, InterpolationIsExactForWhatIsLinearInTheAngles) {
     return 3.0 + 0.01 * theta_i - 0.02 * theta_o + 0.005 * phi + 10.0 * static_cast<double>(row);
   };
   for (std::size_t entry = 0; entry < table.entries(); ++entry) {
-    table.values[entry] = static_cast<float>(
-        linear(table.grid.theta_i.values[table.theta_i_index(entry)], table.grid.theta_o.values[table.theta_o_index(entry)],
-               table.grid.phi.values[table.phi_index(entry)], table.parameter_row(entry)));
+    table.values[entry] = static_cast<float>(linear(
+        table.grid.theta_i.values[table.theta_i_index(entry)], table.grid.theta_o.values[table.theta_o_index(entry)],
+        table.grid.phi.values[table.phi_index(entry)], table.parameter_row(entry)));
   }
   UniformNumbers uniform(4);
   for (int trial = 0; trial < 100; ++trial) {
@@ -503,13 +508,11 @@ TEST(Table, InterpolationIsExactForWhatIsLinearInTheAngles) {
     const Direction view = direction(radians(theta_o), radians(turn));
     EXPECT_NEAR(table.interpolate(row, light, view).x, linear(theta_i, theta_o, phi, row), 1e-5);
   }
-  expect_error(ExitCode::usage, "theta_i", [&] {
-    table.interpolate(0, direction(radians(81.0), 0.0), direction(radians(10.0), 0.0));
-  });
+  expect_error(ExitCode::usage, "theta_i",
+               [&] { table.interpolate(0, direction(radians(81.0), 0.0), direction(radians(10.0), 0.0)); });
   table.valid[0] = 0;
-  expect_error(ExitCode::usage, "masked", [&] {
-    table.interpolate(0, direction(radians(5.0), 0.0), direction(radians(5.0), 0.0));
-  });
+  expect_error(ExitCode::usage, "masked",
+               [&] { table.interpolate(0, direction(radians(5.0), 0.0), direction(radians(5.0), 0.0)); });
 }
 
 // ---- what is not a number ---------------------------------------------------------------------------------------
@@ -571,7 +574,8 @@ std::size_t peak_memory() {
 
 void expect_unreadable(const fs::path& path, const std::string& what) {
   const std::size_t before = peak_memory();
-  expect_error(ExitCode::invalid_input, path.filename().string(), [&] { Table::read(path); }, what);
+  expect_error(
+      ExitCode::invalid_input, path.filename().string(), [&] { Table::read(path); }, what);
   EXPECT_LT(peak_memory() - before, std::size_t{512} << 20) << what << " took too much memory";
 }
 
@@ -622,7 +626,9 @@ TEST_F(TableFiles, FlippedBytesDoNoHarm) {
       const Table table = Table::read(file("broken.exr"));
       EXPECT_EQ(table.values.size(), table.entries() * static_cast<std::size_t>(table.channels));
       for (std::size_t entry = 0; entry < table.entries(); ++entry) {
-        if (table.valid[entry]) { EXPECT_TRUE(std::isfinite(table.value(entry))) << place; }
+        if (table.valid[entry]) {
+          EXPECT_TRUE(std::isfinite(table.value(entry))) << place;
+        }
       }
     } catch (const Error& error) {
       ++refused;
@@ -644,8 +650,14 @@ Attributes good_attributes() {
           {"axes", R"([{"name":"theta_o","unit":"degree","kind":"points","values":[0],"weights":[1]},
                        {"name":"theta_i","unit":"degree","kind":"points","values":[0],"weights":[1]},
                        {"name":"phi","unit":"degree","kind":"points","values":[0],"weights":[1]}])"},
-          {"quantity", "brdf 1/sr"}, {"reference", "lambert"}, {"params", R"({"albedo":[1.0,1.0,1.0]})"},
-          {"method", "exact"}, {"seed", "0"}, {"samples", "0"}, {"shared_facets", "false"}, {"version", "0.1.0"},
+          {"quantity", "brdf 1/sr"},
+          {"reference", "lambert"},
+          {"params", R"({"albedo":[1.0,1.0,1.0]})"},
+          {"method", "exact"},
+          {"seed", "0"},
+          {"samples", "0"},
+          {"shared_facets", "false"},
+          {"version", "0.1.0"},
           {"command", ""}};
 }
 
@@ -684,8 +696,12 @@ TEST_F(TableFiles, OtherPicturesAreRefused) {
   }
   write_picture(file("size.exr"), 3, 2, good_attributes());
   expect_error(ExitCode::invalid_input, "3 × 2", [&] { Table::read(file("size.exr")); });
-  for (const std::vector<std::string>& channels : std::vector<std::vector<std::string>>{
-           {"Y", "A"}, {"Y", "stderr.Y"}, {"R", "G", "A", "stderr.R", "stderr.G"}, {"A"}, {"Y", "A", "stderr.Y", "replicate.0.Y"}}) {
+  for (const std::vector<std::string>& channels :
+       std::vector<std::vector<std::string>>{{"Y", "A"},
+                                             {"Y", "stderr.Y"},
+                                             {"R", "G", "A", "stderr.R", "stderr.G"},
+                                             {"A"},
+                                             {"Y", "A", "stderr.Y", "replicate.0.Y"}}) {
     write_picture(file("channels.exr"), 1, 1, good_attributes(), channels);
     expect_unreadable(file("channels.exr"), "channels are missing");
   }
@@ -696,34 +712,34 @@ TEST_F(TableFiles, OtherPicturesAreRefused) {
 TEST_F(TableFiles, BrokenAttributesAreRefused) {
   const auto axes = [](const std::string& theta_i, const std::string& kind = "points") {
     return R"([{"name":"theta_o","unit":"degree","kind":"points","values":[0],"weights":[1]},
-               {"name":"theta_i","unit":"degree","kind":")" + kind + R"(","values":)" + theta_i + R"(,"weights":[1]},
+               {"name":"theta_i","unit":"degree","kind":")" +
+           kind + R"(","values":)" + theta_i + R"(,"weights":[1]},
                {"name":"phi","unit":"degree","kind":"points","values":[0],"weights":[1]}])";
   };
-  const std::pair<std::string, std::string> broken[] = {
-      {"coordinates", "rusinkiewicz"},
-      {"axes", ""},
-      {"axes", "{}"},
-      {"axes", "[]"},
-      {"axes", "[{\"name\":\"theta_i\"}]"},
-      {"axes", axes("[]")},
-      {"axes", axes("[null]")},
-      {"axes", axes("[NaN]")},
-      {"axes", axes("[1e999]")},
-      {"axes", axes("[\"0\"]")},
-      {"axes", axes("0")},
-      {"axes", axes("[90]")},
-      {"axes", axes("[-1]")},
-      {"axes", axes("[123456]")},
-      {"axes", axes("[0]", "wavelets")},
-      {"params", ""},
-      {"params", "[1]"},
-      {"params", "3"},
-      {"params", "{\"albedo\":1e999}"},
-      {"seed", "-1"},
-      {"seed", "1e3"},
-      {"seed", "99999999999999999999"},
-      {"samples", ""},
-      {"samples", "many"}};
+  const std::pair<std::string, std::string> broken[] = {{"coordinates", "rusinkiewicz"},
+                                                        {"axes", ""},
+                                                        {"axes", "{}"},
+                                                        {"axes", "[]"},
+                                                        {"axes", "[{\"name\":\"theta_i\"}]"},
+                                                        {"axes", axes("[]")},
+                                                        {"axes", axes("[null]")},
+                                                        {"axes", axes("[NaN]")},
+                                                        {"axes", axes("[1e999]")},
+                                                        {"axes", axes("[\"0\"]")},
+                                                        {"axes", axes("0")},
+                                                        {"axes", axes("[90]")},
+                                                        {"axes", axes("[-1]")},
+                                                        {"axes", axes("[123456]")},
+                                                        {"axes", axes("[0]", "wavelets")},
+                                                        {"params", ""},
+                                                        {"params", "[1]"},
+                                                        {"params", "3"},
+                                                        {"params", "{\"albedo\":1e999}"},
+                                                        {"seed", "-1"},
+                                                        {"seed", "1e3"},
+                                                        {"seed", "99999999999999999999"},
+                                                        {"samples", ""},
+                                                        {"samples", "many"}};
   for (const auto& [name, text] : broken) {
     Attributes attributes = good_attributes();
     attributes[name] = text;
@@ -742,7 +758,8 @@ TEST_F(TableFiles, GiganticClaimsTakeNoMemory) {
   write_picture(file("good.exr"), 1, 1, good_attributes());
   const std::string good = bytes_of(file("good.exr"));
   const std::size_t window = good.find(std::string("dataWindow\0box2i\0", 17)) + 17 + 4;
-  for (const int largest : {1'000'000, 100'000'000, std::numeric_limits<int>::max() - 1, std::numeric_limits<int>::max(), -5}) {
+  for (const int largest :
+       {1'000'000, 100'000'000, std::numeric_limits<int>::max() - 1, std::numeric_limits<int>::max(), -5}) {
     for (const auto& [x, y] : {std::pair{largest, 0}, {0, largest}, {largest, largest}}) {
       std::string bytes = good;
       std::memcpy(bytes.data() + window + 8, &x, 4);
@@ -763,8 +780,9 @@ TEST_F(TableFiles, GiganticAxesTakeNoMemory) {
   Attributes attributes = good_attributes();
   attributes["axes"] = R"([{"name":"theta_o","unit":"degree","kind":"points","values":)" + values(2000, 0.04) +
                        R"(,"weights":[1]},{"name":"theta_i","unit":"degree","kind":"points","values":)" +
-                       values(2000, 0.04) + R"(,"weights":[1]},{"name":"phi","unit":"degree","kind":"points","values":)" +
-                       values(100, 1.0) + R"(,"weights":[1]}])";
+                       values(2000, 0.04) +
+                       R"(,"weights":[1]},{"name":"phi","unit":"degree","kind":"points","values":)" + values(100, 1.0) +
+                       R"(,"weights":[1]}])";
   write_picture(file("huge.exr"), 200'000, 2000, attributes, {"Y", "A", "stderr.Y"}, false);
   ASSERT_LT(fs::file_size(file("huge.exr")), 1u << 20);
   expect_unreadable(file("huge.exr"), "400 million entries");
@@ -775,8 +793,9 @@ TEST_F(TableFiles, ParametersOfATableAreHeldToTheModelsRange) {
   Table table = monte_carlo(microfacet_diffuse(), {.exact = true}).row_slice(0);
   for (const Json& nonsense : {Json(7.0), Json(nullptr), Json{{"x", 1}}, Json{0.1, 0.2}, Json(true)}) {
     table.parameters["alpha"] = nonsense;
-    expect_error(ExitCode::invalid_input, "alpha",
-                 [&] { with_table_parameters(find_model("proxima").defaults(), table); }, nonsense.dump());
+    expect_error(
+        ExitCode::invalid_input, "alpha", [&] { with_table_parameters(find_model("proxima").defaults(), table); },
+        nonsense.dump());
   }
 }
 
@@ -894,10 +913,11 @@ TEST(AxisMapping, ParsesItsForms) {
   EXPECT_EQ(plain.power, 1.0);
   EXPECT_EQ(AxisMapping::parse("a=-2*b").scale, -2.0);
   EXPECT_EQ(AxisMapping::parse("a=b^-1").power, -1.0);
-  for (const char* text : {"", "=", "roughness", "=alpha", "roughness=", "roughness=0.4*", "roughness=x*alpha",
-                           "roughness=alpha^", "roughness=alpha^x", "roughness=*alpha", "roughness=0.4*^2",
-                           "roughness=nan*alpha", "roughness=1e999*alpha"}) {
-    expect_error(ExitCode::usage, "", [&] { AxisMapping::parse(text); }, text);
+  for (const char* text :
+       {"", "=", "roughness", "=alpha", "roughness=", "roughness=0.4*", "roughness=x*alpha", "roughness=alpha^",
+        "roughness=alpha^x", "roughness=*alpha", "roughness=0.4*^2", "roughness=nan*alpha", "roughness=1e999*alpha"}) {
+    expect_error(
+        ExitCode::usage, "", [&] { AxisMapping::parse(text); }, text);
   }
 }
 
@@ -906,7 +926,8 @@ TEST(TableModel, FollowsTheAxes) {
   table.grid = small_grid();
   table.parameter_axes = {axis("alpha", {0.04, 0.25, 1.0}, "")};
   table.allocate();
-  const auto row_value = [](const TableModel& on_table, const ParameterValues& values, const char* name, std::size_t row) {
+  const auto row_value = [](const TableModel& on_table, const ParameterValues& values, const char* name,
+                            std::size_t row) {
     return on_table.row(row)[static_cast<std::size_t>(values.info(name).offset)];
   };
   // A parameter of the axis' name follows it, a perceptual roughness its root.
@@ -924,15 +945,12 @@ TEST(TableModel, FollowsTheAxes) {
   EXPECT_DOUBLE_EQ(row_value(mapped, eon, "roughness", 1), 0.4 * 0.5);
   EXPECT_TRUE(mapped.set_by_axis(static_cast<std::size_t>(eon.info("roughness").offset)));
 
-  expect_error(ExitCode::usage, "did you mean", [&] {
-    TableModel(find_model("eon"), eon, table, {AxisMapping::parse("rougness=alpha")});
-  });
-  expect_error(ExitCode::usage, "sigma", [&] {
-    TableModel(find_model("eon"), eon, table, {AxisMapping::parse("roughness=sigma")});
-  });
-  expect_error(ExitCode::usage, "out of range", [&] {
-    TableModel(find_model("eon"), eon, table, {AxisMapping::parse("roughness=4*alpha")});
-  });
+  expect_error(ExitCode::usage, "did you mean",
+               [&] { TableModel(find_model("eon"), eon, table, {AxisMapping::parse("rougness=alpha")}); });
+  expect_error(ExitCode::usage, "sigma",
+               [&] { TableModel(find_model("eon"), eon, table, {AxisMapping::parse("roughness=sigma")}); });
+  expect_error(ExitCode::usage, "out of range",
+               [&] { TableModel(find_model("eon"), eon, table, {AxisMapping::parse("roughness=4*alpha")}); });
 }
 
 TEST(TableModel, RendersTheModel) {
@@ -947,7 +965,8 @@ TEST(TableModel, RendersTheModel) {
   EXPECT_EQ(rendered.valid, table.valid);
   for (const std::size_t entry : {std::size_t{1}, std::size_t{30}, table.entries() - 1}) {
     values.set("alpha", table.parameter_values(table.parameter_row(entry))[0]);
-    EXPECT_EQ(rendered.value(entry), static_cast<float>(model.evaluate(values.flat(), table.wi(entry), table.wo(entry)).x));
+    EXPECT_EQ(rendered.value(entry),
+              static_cast<float>(model.evaluate(values.flat(), table.wi(entry), table.wo(entry)).x));
     EXPECT_EQ(rendered.standard_error(entry), 0.0f);
   }
 }
