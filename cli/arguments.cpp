@@ -28,7 +28,8 @@ std::vector<Axis> parse_axes(const std::vector<std::string>& texts) {
     }
     const std::string name = text.substr(0, equals);
     for (const Axis& axis : axes) {
-      if (axis.name == name) throw Error(ExitCode::usage, "axis '" + name + "' is given twice", "--axis", "give it once");
+      if (axis.name == name)
+        throw Error(ExitCode::usage, "axis '" + name + "' is given twice", "--axis", "give it once");
     }
     axes.push_back({name, "", parse_numbers(std::string_view(text).substr(equals + 1), "--axis " + name), false});
   }
@@ -140,7 +141,9 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
     ParameterValues values = reference->defaults();
     set_parameters(values, settings);
     return {name, is_grey(values) ? 1 : 3,
-            [reference, values](const Direction& wi, const Direction& wo) { return reference->exact(values.flat(), wi, wo); },
+            [reference, values](const Direction& wi, const Direction& wo) {
+              return reference->exact(values.flat(), wi, wo);
+            },
             parameters_json(values)};
   }
   if (is_file(name)) {
@@ -150,7 +153,8 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
     const std::vector<double> coordinates = table->parameter_values(row);
     for (std::size_t i = 0; i < coordinates.size(); ++i) parameters[table->parameter_axes[i].name] = coordinates[i];
     return {name, table->channels,
-            [table, row](const Direction& wi, const Direction& wo) { return table->interpolate(row, wi, wo); }, parameters};
+            [table, row](const Direction& wi, const Direction& wo) { return table->interpolate(row, wi, wo); },
+            parameters};
   }
   const Model& model = find_model(name);
   ParameterValues values = model.defaults();

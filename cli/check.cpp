@@ -27,14 +27,16 @@ CheckResult check_one(const CheckArguments& a, const std::string& name, const Co
   for (const ParameterInfo& info : choice.values.list()) {
     const std::string parameter(info.name);
     const bool fitted = choice.fit && std::any_of(choice.fit->parameters.begin(), choice.fit->parameters.end(),
-                                                  [&](const FitParameter& p) { return p.name.substr(0, p.name.find('.')) == parameter; });
+                                                  [&](const FitParameter& p) {
+                                                    return p.name.substr(0, p.name.find('.')) == parameter;
+                                                  });
     const bool given = std::any_of(a.settings.begin(), a.settings.end(),
                                    [&](const std::string& s) { return s.starts_with(parameter + "="); });
     if (!fitted && !given) vary.push_back(parameter);
   }
   const auto monitor = context.monitor();
-  CheckResult result = check_simd(*choice.model, varied_parameters(choice.values, vary, parameter_set_count, context.seed),
-                                  a.options, *monitor);
+  CheckResult result = check_simd(
+      *choice.model, varied_parameters(choice.values, vary, parameter_set_count, context.seed), a.options, *monitor);
   if (!a.table.empty()) {
     const Table table = Table::read(a.table);
     const ModelChoice on_table = choose_for_table(name, a.settings, a.mappings, table);
@@ -44,9 +46,11 @@ CheckResult check_one(const CheckArguments& a, const std::string& name, const Co
 }
 
 void print_result(const CheckResult& r) {
-  fmt::print("  {:<20} {:<5} {:>9} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>8.1f}  {}\n", r.model, r.device, r.pairs,
-             r.max_abs, r.max_rel, r.p999_rel, r.rms, r.rms_rel, r.evaluations_per_s * 1e-6, r.passed ? "passed" : "FAILED");
-  if (r.table) fmt::print("  against the table: rms {:.6g} in double, {:.6g} in float\n", r.table->rms_double, r.table->rms_float);
+  fmt::print("  {:<20} {:<5} {:>9} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>8.1f}  {}\n", r.model, r.device,
+             r.pairs, r.max_abs, r.max_rel, r.p999_rel, r.rms, r.rms_rel, r.evaluations_per_s * 1e-6,
+             r.passed ? "passed" : "FAILED");
+  if (r.table)
+    fmt::print("  against the table: rms {:.6g} in double, {:.6g} in float\n", r.table->rms_double, r.table->rms_float);
 }
 
 std::string worst_text(const CheckResult& r) {
@@ -68,8 +72,10 @@ void add_check(CLI::App& app, Context& context) {
       "Run a model as a GPU would (vectorised float) against double precision, and against a table\n"
       "  lobefit check fit.json --table truth.exr\n"
       "  lobefit check --all\n"
-      "A pair passes if |float - double| <= 1e-5 |double| + 1e-6/cos(theta_i); one in eight pairs is hostile: grazing to\n"
-      "within 1e-6 of the horizon, retro, mirror or normal. Relative errors are reported for values above 1e-3 1/sr. A fit keeps its parameters; what it does not hold varies over 16 parameter sets.");
+      "A pair passes if |float - double| <= 1e-5 |double| + 1e-6/cos(theta_i); one in eight pairs is hostile: grazing "
+      "to\n"
+      "within 1e-6 of the horizon, retro, mirror or normal. Relative errors are reported for values above 1e-3 1/sr. A "
+      "fit keeps its parameters; what it does not hold varies over 16 parameter sets.");
   const auto a = std::make_shared<CheckArguments>();
   auto* name = verb->add_option("NAME", a->name, "Fit (.json) or model");
   auto* all = verb->add_flag("--all", a->all, "Every registered model");
@@ -87,7 +93,8 @@ void add_check(CLI::App& app, Context& context) {
     if (a->device == "vulkan") {
       throw Error(ExitCode::missing_part, "this build has no Vulkan evaluator", "--device vulkan", "use --device simd");
     }
-    if (a->name.empty() && !a->all) throw Error(ExitCode::usage, "check what?", "check", "name a fit or a model, or use --all");
+    if (a->name.empty() && !a->all)
+      throw Error(ExitCode::usage, "check what?", "check", "name a fit or a model, or use --all");
     a->options.seed = context.seed;
     std::vector<CheckResult> results;
     if (a->all) {
@@ -100,8 +107,8 @@ void add_check(CLI::App& app, Context& context) {
       for (const CheckResult& result : results) list.push_back(result.json());
       std::cout << (a->all ? Json{{"checks", list}} : list[0]).dump(2) << "\n";
     } else {
-      fmt::print("  {:<20} {:<5} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}\n", "model", "dev", "pairs", "max abs", "max rel",
-                 "p999 rel", "rms", "rms rel", "M eval/s");
+      fmt::print("  {:<20} {:<5} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8}\n", "model", "dev", "pairs", "max abs",
+                 "max rel", "p999 rel", "rms", "rms rel", "M eval/s");
       for (const CheckResult& result : results) print_result(result);
       if (context.verbose) {
         for (const CheckResult& result : results) fmt::print("  worst: {}\n", worst_text(result));

@@ -76,16 +76,16 @@ std::string evaluate_csv(const Source& source, const std::string& name) {
     const std::string place = file + ", line " + std::to_string(number);
     const std::vector<std::string> cells = split(line);
     if (cells.size() != header.size()) {
-      throw Error(ExitCode::invalid_input, fmt::format("{} cells, the header has {}", cells.size(), header.size()), place,
-                  "give each row all columns");
+      throw Error(ExitCode::invalid_input, fmt::format("{} cells, the header has {}", cells.size(), header.size()),
+                  place, "give each row all columns");
     }
     const Rgb f = at_line(place, [&] {
       const Direction wi = parse_direction(cells[columns[0]] + "," + cells[columns[1]], "theta_i,phi_i");
       const Direction wo = parse_direction(cells[columns[2]] + "," + cells[columns[3]], "theta_o,phi_o");
       return source.evaluate(wi, wo);
     });
-    result += source.channels == 1 ? fmt::format("{},{}\n", line, f.x)
-                                   : fmt::format("{},{},{},{}\n", line, f.x, f.y, f.z);
+    result +=
+        source.channels == 1 ? fmt::format("{},{}\n", line, f.x) : fmt::format("{},{},{},{}\n", line, f.x, f.y, f.z);
   }
   return result;
 }
@@ -113,13 +113,15 @@ void add_eval(CLI::App& app, Context& context) {
       return;
     }
     if (a->wi.empty() || a->wi.size() != a->wo.size()) {
-      throw Error(ExitCode::usage, fmt::format("{} directions to the light, {} to the viewer", a->wi.size(), a->wo.size()),
-                  "eval", "give --wi and --wo in pairs, or --csv FILE");
+      throw Error(ExitCode::usage,
+                  fmt::format("{} directions to the light, {} to the viewer", a->wi.size(), a->wo.size()), "eval",
+                  "give --wi and --wo in pairs, or --csv FILE");
     }
     Json values = Json::array();
     for (std::size_t i = 0; i < a->wi.size(); ++i) {
       const Rgb f = source.evaluate(parse_direction(a->wi[i], "--wi"), parse_direction(a->wo[i], "--wo"));
-      values.push_back({{"wi", parse_numbers(a->wi[i], "--wi")}, {"wo", parse_numbers(a->wo[i], "--wo")},
+      values.push_back({{"wi", parse_numbers(a->wi[i], "--wi")},
+                        {"wo", parse_numbers(a->wo[i], "--wo")},
                         {"f", rgb_json(f, source.channels)}});
       if (!context.json) fmt::print("{}\n", rgb_text(f, source.channels));
     }
@@ -130,10 +132,10 @@ void add_eval(CLI::App& app, Context& context) {
 }
 
 void add_albedo(CLI::App& app, Context& context) {
-  CLI::App* verb = app.add_subcommand(
-      "albedo",
-      "Directional albedo: the integral of f times cosine over the other direction, by quadrature\n"
-      "  lobefit albedo eon --set roughness=1 --theta 0,45,80");
+  CLI::App* verb =
+      app.add_subcommand("albedo",
+                         "Directional albedo: the integral of f times cosine over the other direction, by quadrature\n"
+                         "  lobefit albedo eon --set roughness=1 --theta 0,45,80");
   struct Arguments {
     std::string name, theta, fixed = "view";
     std::vector<std::string> settings;

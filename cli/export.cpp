@@ -25,7 +25,8 @@ void add_export(CLI::App& app, Context& context) {
   verb->add_option("-o,--output", a->output, "File to write (default: stdout)");
   verb->callback([&context, a] {
     const ModelChoice choice = find_model_or_fit(a->name, a->settings);
-    const std::string origin = choice.fit ? "Fitted constants from " + std::filesystem::path(a->name).filename().string() : "";
+    const std::string origin =
+        choice.fit ? "Fitted constants from " + std::filesystem::path(a->name).filename().string() : "";
     write_or_print(shader_text(*choice.model, choice.values, choice.fit ? &*choice.fit : nullptr, a->language,
                                context.command, origin),
                    a->output, context.force);

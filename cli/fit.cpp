@@ -23,12 +23,14 @@ void parse_loss(const std::string& text, FitOptions& options) {
   const std::string name = text.substr(0, colon);
   const auto found = std::find(loss_names.begin(), loss_names.end(), name);
   if (found == loss_names.end()) {
-    throw Error(ExitCode::usage, "unknown loss '" + name + "'", "--loss", "choose none, huber or cauchy, such as huber:0.05");
+    throw Error(ExitCode::usage, "unknown loss '" + name + "'", "--loss",
+                "choose none, huber or cauchy, such as huber:0.05");
   }
   options.loss = static_cast<Loss>(found - loss_names.begin());
   if (colon == std::string::npos) return;
   options.loss_scale = parse_number(text.substr(colon + 1), "--loss");
-  if (options.loss_scale <= 0.0) throw Error(ExitCode::usage, "the scale must be positive", "--loss", "such as huber:0.05");
+  if (options.loss_scale <= 0.0)
+    throw Error(ExitCode::usage, "the scale must be positive", "--loss", "such as huber:0.05");
 }
 
 /// Which parameters are free, and the values of the others.
@@ -59,7 +61,8 @@ std::vector<std::string> choose_free(const FitArguments& a, const Table& table, 
   }
   for (const std::string& name : fixed) {
     if (!a.free.empty() && std::find(free.begin(), free.end(), name) != free.end()) {
-      throw Error(ExitCode::usage, "parameter '" + name + "' is both free and fixed", "fit", "drop it from one of them");
+      throw Error(ExitCode::usage, "parameter '" + name + "' is both free and fixed", "fit",
+                  "drop it from one of them");
     }
     std::erase(free, name);
   }
@@ -79,7 +82,8 @@ void add_fit(CLI::App& app, Context& context) {
   verb->add_option("MODEL", a->model, "Model: see `lobefit models`")->required();
   verb->add_option("TABLE", a->table, "Table file")->required();
   verb->add_option("-o,--output", a->output, "Fit to write (.json)");
-  add_repeatable(*verb, "--free", a->free, "Parameters to fit, NAME or NAME=START (repeatable, or separated by commas)")->delimiter(',');
+  add_repeatable(*verb, "--free", a->free, "Parameters to fit, NAME or NAME=START (repeatable, or separated by commas)")
+      ->delimiter(',');
   add_repeatable(*verb, "--fix", a->fix, "Parameters to hold, NAME or NAME=VALUE (repeatable)");
   add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER: a table axis sets a parameter (repeatable)");
   verb->add_option("--tier", a->tier, "Without --free: fit the parameters up to this tier")
@@ -88,14 +92,17 @@ void add_fit(CLI::App& app, Context& context) {
   verb->add_option("--metric", a->metric,
                    "cosine (pi f cos), brdf (pi f), log (log(1 + f cos)), cube_root ((f cos)^1/3)")
       ->capture_default_str();
-  verb->add_option("--weights", a->weights,
-                   "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
+  verb->add_option(
+          "--weights", a->weights,
+          "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
       ->capture_default_str();
-  verb->add_option("--loss", a->loss, "none, huber[:SCALE] or cauchy[:SCALE], SCALE in units of the metric")->capture_default_str();
+  verb->add_option("--loss", a->loss, "none, huber[:SCALE] or cauchy[:SCALE], SCALE in units of the metric")
+      ->capture_default_str();
   verb->add_option("--starts", a->options.starts, "Start points: the first is the model's default")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  verb->add_option("--holdout", a->options.holdout, "Fraction of entries kept out of the fit and scored")->check(CLI::Range(0.0, 0.9));
+  verb->add_option("--holdout", a->options.holdout, "Fraction of entries kept out of the fit and scored")
+      ->check(CLI::Range(0.0, 0.9));
   verb->callback([&context, a] {
     const Model& model = find_model(a->model);
     FitOptions options = a->options;

@@ -43,7 +43,8 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& error) {
 /// Refuses an unknown verb with the nearest one; CLI11 would only say that an argument was not expected.
 void check_verb(const CLI::App& app, int argc, char** argv) {
   std::vector<std::string> verbs;
-  for (const CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) verbs.push_back(verb->get_name());
+  for (const CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; }))
+    verbs.push_back(verb->get_name());
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--threads" || argument == "--seed") {

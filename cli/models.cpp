@@ -51,11 +51,16 @@ Json model_json(const Model& model) {
           {"params", parameters},
           {"source", model.info->source},
           {"properties",
-           {{"reciprocal", model.info->reciprocal}, {"energy_conserving", model.info->energy_conserving},
-            {"isotropic", model.info->isotropic}, {"non_negative", model.info->non_negative}}},
+           {{"reciprocal", model.info->reciprocal},
+            {"energy_conserving", model.info->energy_conserving},
+            {"isotropic", model.info->isotropic},
+            {"non_negative", model.info->non_negative}}},
           {"operations",
-           {{"total", operations.total()}, {"add_multiply", operations.add_multiply}, {"divide", operations.divide},
-            {"square_root", operations.square_root}, {"transcendental", operations.transcendental},
+           {{"total", operations.total()},
+            {"add_multiply", operations.add_multiply},
+            {"divide", operations.divide},
+            {"square_root", operations.square_root},
+            {"transcendental", operations.transcendental},
             {"compare_select", operations.compare_select}}}};
 }
 
@@ -66,9 +71,11 @@ void print_model(const Model& model) {
   fmt::print("  {}, {}, {}, {}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
              info.energy_conserving ? "energy conserving" : "can reflect more than it receives",
              info.isotropic ? "isotropic" : "anisotropic", info.non_negative ? "never negative" : "can be negative");
-  fmt::print("  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} compare/select)\n",
-             operations.total(), operations.add_multiply, operations.divide, operations.square_root,
-             operations.transcendental, operations.compare_select);
+  fmt::print(
+      "  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} "
+      "compare/select)\n",
+      operations.total(), operations.add_multiply, operations.divide, operations.square_root, operations.transcendental,
+      operations.compare_select);
   print_parameters(model.parameters);
 }
 
@@ -93,7 +100,8 @@ void add_models(CLI::App& app, Context& context) {
       fmt::print("  {:<20} {:<52} {}\n", "model", "title", "parameters");
       for (const Model& model : models()) {
         std::string parameters;
-        for (const ParameterInfo& info : model.parameters) parameters += (parameters.empty() ? "" : " ") + std::string(info.name);
+        for (const ParameterInfo& info : model.parameters)
+          parameters += (parameters.empty() ? "" : " ") + std::string(info.name);
         fmt::print("  {:<20} {:<52} {}\n", model.info->name, model.info->title, parameters);
       }
       fmt::print("\n`lobefit models NAME` describes one.\n");
@@ -117,11 +125,15 @@ void add_references(CLI::App& app, Context& context) {
       if (context.json) {
         Json parameters = Json::array();
         for (const ParameterInfo& info : reference->parameters) parameters.push_back(parameter_json(info));
-        list.push_back({{"name", reference->name}, {"doc", reference->doc}, {"source", reference->source},
-                        {"exact", true}, {"params", parameters}});
+        list.push_back({{"name", reference->name},
+                        {"doc", reference->doc},
+                        {"source", reference->source},
+                        {"exact", true},
+                        {"params", parameters}});
       } else {
-        fmt::print("{}: {}\n  Source: {}\n  Methods: monte_carlo (visible normals, sobol or philox), exact (quadrature)\n",
-                   reference->name, reference->doc, reference->source);
+        fmt::print(
+            "{}: {}\n  Source: {}\n  Methods: monte_carlo (visible normals, sobol or philox), exact (quadrature)\n",
+            reference->name, reference->doc, reference->source);
         print_parameters(reference->parameters);
       }
     }

@@ -23,7 +23,8 @@ OutputFolder::OutputFolder(fs::path destination, bool overwrite) : destination_(
   staging_ = parent / ("." + destination_.filename().string() + ".partial-" + std::to_string(getpid()));
   fs::create_directories(staging_, code);
   if (code) {
-    throw Error(ExitCode::failure, "can't write: " + code.message(), destination_.string(), "check the folder and its permissions");
+    throw Error(ExitCode::failure, "can't write: " + code.message(), destination_.string(),
+                "check the folder and its permissions");
   }
 }
 
@@ -35,7 +36,8 @@ OutputFolder::~OutputFolder() {
 void OutputFolder::commit() {
   try {
     fs::create_directories(destination_);
-    for (const auto& file : fs::directory_iterator(staging_)) fs::rename(file.path(), destination_ / file.path().filename());
+    for (const auto& file : fs::directory_iterator(staging_))
+      fs::rename(file.path(), destination_ / file.path().filename());
   } catch (const fs::filesystem_error& error) {
     throw Error(ExitCode::failure, "can't write: " + error.code().message(), destination_.string(), "check the folder");
   }

@@ -47,7 +47,8 @@ LabelledTable model_on(const std::string& text, const Table& table) {
   std::vector<std::string> settings, mappings;
   for (std::size_t begin = colon; begin != std::string::npos && begin + 1 < text.size();) {
     const std::size_t comma = text.find(',', begin + 1);
-    const std::string setting = text.substr(begin + 1, comma == std::string::npos ? std::string::npos : comma - begin - 1);
+    const std::string setting =
+        text.substr(begin + 1, comma == std::string::npos ? std::string::npos : comma - begin - 1);
     const std::size_t equals = setting.find('=');
     const bool numeric = equals != std::string::npos && equals + 1 < setting.size() &&
                          setting.find_first_not_of("0123456789.+-eE", equals + 1) == std::string::npos;
@@ -60,9 +61,8 @@ LabelledTable model_on(const std::string& text, const Table& table) {
 }
 
 std::size_t index_on(const Axis& axis, double angle, const char* option) {
-  const auto found = std::min_element(axis.values.begin(), axis.values.end(), [&](double x, double y) {
-    return std::abs(x - angle) < std::abs(y - angle);
-  });
+  const auto found = std::min_element(axis.values.begin(), axis.values.end(),
+                                      [&](double x, double y) { return std::abs(x - angle) < std::abs(y - angle); });
   if (std::abs(*found - angle) > 1e-6) {
     throw Error(ExitCode::usage, axis.name + " = " + number_text(angle) + " is no angle of the table", option,
                 "the nearest is " + number_text(*found));
@@ -86,15 +86,16 @@ void add_plot(CLI::App& app, Context& context) {
     const auto a = std::make_shared<PlotArguments>();
     kind->add_option("NAME", a->name, "Table file, reference or model")->required();
     add_repeatable(*kind, "--with", a->models,
-                     "Model or fit to draw against it, NAME or NAME:parameter=value,… (repeatable);\n"
-                     "a value SCALE*AXIS^POWER maps a table axis");
+                   "Model or fit to draw against it, NAME or NAME:parameter=value,… (repeatable);\n"
+                   "a value SCALE*AXIS^POWER maps a table axis");
     add_repeatable(*kind, "--set", a->settings, "NAME=VALUE of a reference or model (repeatable)");
     add_repeatable(*kind, "--axis", a->axes, "NAME=v1,v2,… of a reference or model (repeatable)");
     kind->add_option("--grid", a->grid, "Grid for a reference or model")->capture_default_str();
     kind->add_option("--theta-o", a->theta_o, "View angle in degrees")->capture_default_str();
     kind->add_option("--phi", a->phi, "Azimuth difference in degrees: 0 is the retro side")->capture_default_str();
     kind->add_option("--title", a->title, "Title (default: the name)");
-    kind->add_option("--width", a->width, "Width in pixels (default: what suits the panels)")->check(CLI::Range(200, 8000));
+    kind->add_option("--width", a->width, "Width in pixels (default: what suits the panels)")
+        ->check(CLI::Range(200, 8000));
     kind->add_option("--height", a->height, "Height in pixels")->check(CLI::Range(200, 8000));
     if (std::string_view(name) == "slices") {
       kind->add_flag("--both-sides", a->both_sides, "Also the azimuth 180 - phi, at negative theta_i");
@@ -113,12 +114,14 @@ void add_plot(CLI::App& app, Context& context) {
       write_figure(figure(table, lines, choice, a->title.empty() ? a->name : a->title), a->output, context.force, size);
     });
   };
-  add("slices", "pi f cos(theta_i) along theta_i, a panel per parameter row, with error bars",
+  add(
+      "slices", "pi f cos(theta_i) along theta_i, a panel per parameter row, with error bars",
       [](const Table& t, const std::vector<LabelledTable>& m, const SliceChoice& c, const std::string& title) {
         return slice_figure(t, m, c, title);
       },
       [](const Table& t, std::size_t, const SliceChoice& c) { return slice_figure_size(t, c); });
-  add("residuals", "model minus reference over (theta_i, theta_o), a panel per model and parameter row",
+  add(
+      "residuals", "model minus reference over (theta_i, theta_o), a panel per model and parameter row",
       [](const Table& t, const std::vector<LabelledTable>& m, const SliceChoice& c, const std::string& title) {
         return residual_figure(t, m, c, title);
       },

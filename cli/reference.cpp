@@ -9,11 +9,11 @@
 namespace lobefit {
 
 void add_reference(CLI::App& app, Context& context) {
-  CLI::App* verb = app.add_subcommand(
-      "reference",
-      "Ground truth at one pair of directions, with its standard error\n"
-      "  lobefit reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --wo 60,180 --stderr 1e-5\n"
-      "  lobefit reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --wo 60,0 --exact");
+  CLI::App* verb =
+      app.add_subcommand("reference",
+                         "Ground truth at one pair of directions, with its standard error\n"
+                         "  lobefit reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --wo 60,180 --stderr 1e-5\n"
+                         "  lobefit reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --wo 60,0 --exact");
   struct Arguments {
     std::string name, wi, wo;
     std::vector<std::string> settings;
@@ -42,15 +42,23 @@ void add_reference(CLI::App& app, Context& context) {
     }
     const int channels = find_source(a->name, a->settings).channels;
     if (context.json) {
-      std::cout << Json{{"reference", a->name}, {"params", parameters_json(values)},
-                        {"wi", parse_numbers(a->wi, "--wi")}, {"wo", parse_numbers(a->wo, "--wo")},
-                        {"f", rgb_json(result.f, channels)}, {"stderr", rgb_json(result.stderr_f, channels)},
-                        {"samples", result.samples}, {"method", result.method}, {"seed", context.seed}}.dump(2)
+      std::cout << Json{{"reference", a->name},
+                        {"params", parameters_json(values)},
+                        {"wi", parse_numbers(a->wi, "--wi")},
+                        {"wo", parse_numbers(a->wo, "--wo")},
+                        {"f", rgb_json(result.f, channels)},
+                        {"stderr", rgb_json(result.stderr_f, channels)},
+                        {"samples", result.samples},
+                        {"method", result.method},
+                        {"seed", context.seed}}
+                       .dump(2)
                 << "\n";
     } else if (a->sampling.exact) {
-      fmt::print("{:.12g}{}\n", result.f.x, channels == 1 ? "" : fmt::format("  {:.12g}  {:.12g}", result.f.y, result.f.z));
+      fmt::print("{:.12g}{}\n", result.f.x,
+                 channels == 1 ? "" : fmt::format("  {:.12g}  {:.12g}", result.f.y, result.f.z));
     } else {
-      fmt::print("{}  +- {}  ({} samples)\n", rgb_text(result.f, channels), rgb_text(result.stderr_f, channels), result.samples);
+      fmt::print("{}  +- {}  ({} samples)\n", rgb_text(result.f, channels), rgb_text(result.stderr_f, channels),
+                 result.samples);
     }
   });
 }

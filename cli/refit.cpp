@@ -63,7 +63,8 @@ std::string interval_text(const FitParameter& p) {
 /// The result as a Markdown page.
 std::string result_page(const Recipe& recipe, const RecipeResult& result, const std::string& command) {
   std::string page = "# " + recipe.title + "\n\n" + recipe.description + "\n\n**" + result.conclusion + "**\n\n";
-  page += "Made by `" + command + "`, lobefit " LOBEFIT_VERSION ". Intervals are 95 %, from the Monte Carlo error of the reference.\n\n";
+  page += "Made by `" + command +
+          "`, lobefit " LOBEFIT_VERSION ". Intervals are 95 %, from the Monte Carlo error of the reference.\n\n";
   page += "| row | method |";
   std::vector<std::string> names;
   for (const auto& [name, value] : recipe.published) names.push_back(name);
@@ -97,7 +98,9 @@ void print_result(const RecipeResult& result) {
     for (const FitParameter& p : line.fit.parameters) {
       if (!p.free) continue;
       constants += fmt::format("{}{} {:.4f}{}", constants.empty() ? "" : "  ", p.name, p.estimate.value,
-                               !p.estimate.identifiable ? " (no effect)" : p.estimate.at_bound ? " (bound)" : "");
+                               !p.estimate.identifiable ? " (no effect)"
+                               : p.estimate.at_bound    ? " (bound)"
+                                                        : "");
     }
     fmt::print("  {:<36} {:<12} {:<52} {:>9.4f} {:>8.4f}\n", line.row->name, line.method, constants, line.rms_published,
                line.rms_refit);
@@ -217,11 +220,12 @@ bool run(const std::string& name, const std::string& output, const Context& cont
   } else {
     print_result(result);
     fmt::print("\nWritten to {}: result.json, result.md, tables, fits, shaders and figures; open {}\n",
-               folder.destination().string(), (folder.destination() / (recipe.rows.front().name + ".slices.png")).string());
+               folder.destination().string(),
+               (folder.destination() / (recipe.rows.front().name + ".slices.png")).string());
   }
   if (!passed) {
-    throw Error(ExitCode::check_failed, "a fitted model in float strays from double precision", folder.destination().string(),
-                "see \"checks\" in result.json");
+    throw Error(ExitCode::check_failed, "a fitted model in float strays from double precision",
+                folder.destination().string(), "see \"checks\" in result.json");
   }
   return passed;
 }
@@ -231,12 +235,12 @@ bool run(const std::string& name, const std::string& output, const Context& cont
 void add_refit(CLI::App& app, Context& context) {
   std::string shipped;
   for (const std::string& name : shipped_recipes()) shipped += (shipped.empty() ? "" : ", ") + name;
-  CLI::App* verb = app.add_subcommand(
-      "refit",
-      "Run a recipe end to end: render its references, fit, check, draw, export\n"
-      "  lobefit refit proxima -o out/proxima\n"
-      "  lobefit refit my_recipe.json\n"
-      "Shipped recipes: " + shipped);
+  CLI::App* verb = app.add_subcommand("refit",
+                                      "Run a recipe end to end: render its references, fit, check, draw, export\n"
+                                      "  lobefit refit proxima -o out/proxima\n"
+                                      "  lobefit refit my_recipe.json\n"
+                                      "Shipped recipes: " +
+                                          shipped);
   struct Arguments {
     std::string name, output;
     bool all = false;

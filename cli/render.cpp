@@ -10,12 +10,12 @@
 namespace lobefit {
 
 void add_render(CLI::App& app, Context& context) {
-  CLI::App* verb = app.add_subcommand(
-      "render",
-      "Render a reference (or a model) over a grid of directions into a table (EXR)\n"
-      "  lobefit render microfacet_diffuse --grid default --axis alpha=0.1,0.5,1 -o truth.exr\n"
-      "GRID: small (9 x 9 x 10), default (18 x 18 x 19), fine (36 x 36 x 37), or a JSON file\n"
-      "  {\"theta_i\":[0,30,60],\"theta_o\":[0,45],\"phi\":[0,90,180]}");
+  CLI::App* verb =
+      app.add_subcommand("render",
+                         "Render a reference (or a model) over a grid of directions into a table (EXR)\n"
+                         "  lobefit render microfacet_diffuse --grid default --axis alpha=0.1,0.5,1 -o truth.exr\n"
+                         "GRID: small (9 x 9 x 10), default (18 x 18 x 19), fine (36 x 36 x 37), or a JSON file\n"
+                         "  {\"theta_i\":[0,30,60],\"theta_o\":[0,45],\"phi\":[0,90,180]}");
   struct Arguments {
     std::string name, grid = "default", output, facets = "shared";
     std::vector<std::string> settings, axes;
@@ -37,7 +37,8 @@ void add_render(CLI::App& app, Context& context) {
   verb->callback([&context, a] {
     const Grid grid = Grid::named_or_file(a->grid);
     const std::vector<Axis> axes = parse_axes(a->axes);
-    const RenderOptions options{.sampling = a->sampling.checked(context.seed), .exact = a->sampling.exact,
+    const RenderOptions options{.sampling = a->sampling.checked(context.seed),
+                                .exact = a->sampling.exact,
                                 .shared_facets = a->facets == "shared"};
     const Reference* reference = find_reference_or_null(a->name);
     const Model* model = reference ? nullptr : &find_model(a->name);

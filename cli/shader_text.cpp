@@ -16,10 +16,10 @@ std::string shader_text(const Model& model, const ParameterValues& values, const
     if (fit) {
       for (const FitParameter& p : fit->parameters) {
         if (p.name != info.name || !p.free) continue;
-        parameter.comment = p.estimate.at_bound ? "fitted; at its bound"
-                            : p.estimate.standard_error > 0.0
-                                ? fmt::format("fitted; 95 % interval [{:.6g}, {:.6g}]", p.estimate.ci_low, p.estimate.ci_high)
-                                : "fitted to an exact table";
+        parameter.comment = p.estimate.at_bound               ? "fitted; at its bound"
+                            : p.estimate.standard_error > 0.0 ? fmt::format("fitted; 95 % interval [{:.6g}, {:.6g}]",
+                                                                            p.estimate.ci_low, p.estimate.ci_high)
+                                                              : "fitted to an exact table";
       }
     }
     parameters.push_back(std::move(parameter));

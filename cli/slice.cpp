@@ -12,7 +12,8 @@ Slice cut(const Table& table, const std::vector<std::string>& held) {
   std::vector<int> fixed(all.size(), -1);
   for (const std::string& text : held) {
     const std::string name = text.substr(0, text.find('='));
-    const auto axis = std::find_if(all.begin(), all.end(), [&](const Axis& candidate) { return candidate.name == name; });
+    const auto axis =
+        std::find_if(all.begin(), all.end(), [&](const Axis& candidate) { return candidate.name == name; });
     if (axis == all.end() || name.size() + 1 >= text.size()) {
       std::vector<std::string> names;
       for (const Axis& candidate : all) names.push_back(candidate.name);

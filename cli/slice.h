@@ -8,8 +8,8 @@ namespace lobefit {
 
 struct Slice {
   const Table* table;
-  std::vector<Axis> axes;             // those left, slowest first
-  std::vector<std::size_t> entries;   // in the order of the axes
+  std::vector<Axis> axes;            // those left, slowest first
+  std::vector<std::size_t> entries;  // in the order of the axes
 
   std::string csv() const;
   /// Mean of the channels of π f cos theta_i, the last axis along a line; NaN where masked.

@@ -28,8 +28,8 @@ void add_info(CLI::App& tables, Context& context) {
       fmt::print("  {:<10} {:>4} {} from {:g} to {:g} {}\n", axis["name"].get<std::string>(), values.size(),
                  axis["kind"].get<std::string>(), values.front(), values.back(), axis["unit"].get<std::string>());
     }
-    fmt::print("  {} entries, {} masked, {} channel{}, {} replicates\n", table.entries(), table.masked(), table.channels,
-               table.channels == 1 ? "" : "s", description["replicates"].get<int>());
+    fmt::print("  {} entries, {} masked, {} channel{}, {} replicates\n", table.entries(), table.masked(),
+               table.channels, table.channels == 1 ? "" : "s", description["replicates"].get<int>());
     for (const auto& [key, value] : description["provenance"].items()) {
       fmt::print("  {:<14} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
     }
@@ -37,11 +37,10 @@ void add_info(CLI::App& tables, Context& context) {
 }
 
 void add_slice(CLI::App& tables, Context& context) {
-  CLI::App* verb = tables.add_subcommand(
-      "slice",
-      "Part of a table as CSV, or as a false-colour picture of two axes\n"
-      "  lobefit table slice truth.exr --at alpha=0.5 --at theta_o=60 --at phi=0\n"
-      "  lobefit table slice truth.exr --at alpha=0.5 --at phi=180 -o slice.png");
+  CLI::App* verb = tables.add_subcommand("slice",
+                                         "Part of a table as CSV, or as a false-colour picture of two axes\n"
+                                         "  lobefit table slice truth.exr --at alpha=0.5 --at theta_o=60 --at phi=0\n"
+                                         "  lobefit table slice truth.exr --at alpha=0.5 --at phi=180 -o slice.png");
   struct Arguments {
     std::string name, output;
     std::vector<std::string> at;
@@ -58,19 +57,18 @@ void add_slice(CLI::App& tables, Context& context) {
       return;
     }
     if (slice.axes.size() != 2) {
-      throw Error(ExitCode::usage, fmt::format("a picture shows two axes, {} are left", slice.axes.size()), "table slice",
-                  "hold the others with --at AXIS=VALUE");
+      throw Error(ExitCode::usage, fmt::format("a picture shows two axes, {} are left", slice.axes.size()),
+                  "table slice", "hold the others with --at AXIS=VALUE");
     }
     write_false_colour(slice.cosine_picture(), slice.axes[1].size(), slice.axes[0].size(), a->output, context.force);
   });
 }
 
 void add_compare(CLI::App& tables, Context& context) {
-  CLI::App* verb = tables.add_subcommand(
-      "compare",
-      "How far a second table, a model or a fit is from a table, in every metric\n"
-      "  lobefit table compare truth.exr other.exr --tolerance 1e-4\n"
-      "  lobefit table compare truth.exr chan_2024 --set multiple_scattering=0");
+  CLI::App* verb = tables.add_subcommand("compare",
+                                         "How far a second table, a model or a fit is from a table, in every metric\n"
+                                         "  lobefit table compare truth.exr other.exr --tolerance 1e-4\n"
+                                         "  lobefit table compare truth.exr chan_2024 --set multiple_scattering=0");
   struct Arguments {
     std::string first, second, weights = "uniform", metric = "cosine";
     std::vector<std::string> settings, mappings;
@@ -81,10 +79,12 @@ void add_compare(CLI::App& tables, Context& context) {
   verb->add_option("B", a->second, "Table file on the same grid, model, or fit (JSON)")->required();
   add_repeatable(*verb, "--set", a->settings, "NAME=VALUE of the model (repeatable)");
   add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER of the model (repeatable)");
-  verb->add_option("--weights", a->weights,
-                   "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
+  verb->add_option(
+          "--weights", a->weights,
+          "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
       ->capture_default_str();
-  verb->add_option("--metric", a->metric, "Metric that --tolerance bounds: cosine, brdf, log, cube_root")->capture_default_str();
+  verb->add_option("--metric", a->metric, "Metric that --tolerance bounds: cosine, brdf, log, cube_root")
+      ->capture_default_str();
   auto* tolerance = verb->add_option("--tolerance", a->tolerance, "Exit with 5 if the metric is larger");
   verb->callback([&context, a, tolerance] {
     const Table table = Table::read(a->first);
@@ -105,14 +105,17 @@ void add_compare(CLI::App& tables, Context& context) {
     double found = 0.0;
     for (std::size_t q = 0; q < quantity_names.size(); ++q) {
       const auto quantity = static_cast<Quantity>(q);
-      const double rms = rms_difference(table, values, quantity, entry_weights(table, parse_weights(a->weights), quantity));
+      const double rms =
+          rms_difference(table, values, quantity, entry_weights(table, parse_weights(a->weights), quantity));
       metrics[std::string(quantity_names[q])] = rms;
       if (quantity == bounded) found = rms;
     }
     const bool passed = tolerance->count() == 0 || found <= a->tolerance;
     if (context.json) {
-      std::cout << Json{{"a", a->first}, {"b", a->second}, {"weights", a->weights}, {"rms", metrics}, {"passed", passed}}.dump(2)
-                << "\n";
+      std::cout
+          << Json{{"a", a->first}, {"b", a->second}, {"weights", a->weights}, {"metrics", metrics}, {"passed", passed}}
+                 .dump(2)
+          << "\n";
     } else {
       for (const auto& [name, value] : metrics.items()) fmt::print("  rms {:<10} {:.6g}\n", name, value.get<double>());
     }

@@ -36,8 +36,8 @@ void set_pair(FloatPairs& pairs, std::size_t i, std::uint64_t seed) {
   Direction wi = up(u[0], u[1]), wo = up(u[2], u[3]);
   if (i % 8 == 0) {
     switch (i / 8 % 4) {
-      case 0: wi = up(1e-4 * u[0] + 1e-6, u[1]); break;         // light at grazing angles
-      case 1: wo = up(1e-4 * u[2] + 1e-6, u[3]); break;         // view at grazing angles
+      case 0: wi = up(1e-4 * u[0] + 1e-6, u[1]); break;                          // light at grazing angles
+      case 1: wo = up(1e-4 * u[2] + 1e-6, u[3]); break;                          // view at grazing angles
       case 2: wo = i / 32 % 2 == 0 ? wi : Direction{-wi.x, -wi.y, wi.z}; break;  // retro, mirror
       case 3: (i / 32 % 2 == 0 ? wi : wo) = {0.0, 0.0, 1.0}; break;
     }
@@ -85,7 +85,8 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
   FloatRgb values(n);
   const auto evaluate = [&] {
     tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
-      float_model.evaluate(float_sets[set_of(block)], pairs, block * block_size, std::min(n, (block + 1) * block_size), values);
+      float_model.evaluate(float_sets[set_of(block)], pairs, block * block_size, std::min(n, (block + 1) * block_size),
+                           values);
     });
   };
   evaluate();  // pages and caches warm, before the clock
@@ -116,7 +117,8 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
           continue;
         }
         const double error = std::abs(found[c] - expected[c]);
-        const double excess = error / (options.relative_bound * std::abs(expected[c]) + options.absolute_bound / cos_theta_i);
+        const double excess =
+            error / (options.relative_bound * std::abs(expected[c]) + options.absolute_bound / cos_theta_i);
         e.squares += error * error;
         e.max_abs = max(e.max_abs, error);
         if (std::abs(expected[c]) >= smallest_relative_value) {
@@ -159,8 +161,8 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
   result.max_abs = total.max_abs;
   result.max_rel = total.max_rel;
   result.rms = std::sqrt(total.squares / (3.0 * static_cast<double>(n)));
-  result.rms_rel = total.relative_count > 0
-                       ? std::sqrt(total.relative_squares / static_cast<double>(total.relative_count)) : 0.0;
+  result.rms_rel =
+      total.relative_count > 0 ? std::sqrt(total.relative_squares / static_cast<double>(total.relative_count)) : 0.0;
   std::erase_if(relative, [](float r) { return r < 0.0f; });
   if (!relative.empty()) {
     const auto rank = relative.begin() + static_cast<std::ptrdiff_t>(0.999 * static_cast<double>(relative.size() - 1));
@@ -203,15 +205,24 @@ Json CheckResult::json() const {
   }
   // Vectors, since degrees would lose the bits that made them the worst.
   const auto vector = [](const Direction& w) { return Json{w.x, w.y, w.z}; };
-  const auto angles = [](const Direction& w) {
-    return Json{degrees(std::acos(w.z)), degrees(std::atan2(w.y, w.x))};
-  };
-  Json document{{"device", device}, {"software", software}, {"model", model}, {"pairs", pairs},
-                {"max_abs", max_abs}, {"max_rel", max_rel}, {"p999_rel", p999_rel}, {"rms", rms}, {"rms_rel", rms_rel},
-                {"failures", failures}, {"non_finite", non_finite},
+  const auto angles = [](const Direction& w) { return Json{degrees(std::acos(w.z)), degrees(std::atan2(w.y, w.x))}; };
+  Json document{{"device", device},
+                {"software", software},
+                {"model", model},
+                {"pairs", pairs},
+                {"max_abs", max_abs},
+                {"max_rel", max_rel},
+                {"p999_rel", p999_rel},
+                {"rms", rms},
+                {"rms_rel", rms_rel},
+                {"failures", failures},
+                {"non_finite", non_finite},
                 {"worst",
-                 {{"wi", angles(worst_wi)}, {"wo", angles(worst_wo)}, {"wi_vector", vector(worst_wi)},
-                  {"wo_vector", vector(worst_wo)}, {"params", parameters}}},
+                 {{"wi", angles(worst_wi)},
+                  {"wo", angles(worst_wo)},
+                  {"wi_vector", vector(worst_wi)},
+                  {"wo_vector", vector(worst_wo)},
+                  {"params", parameters}}},
                 {"evaluations_per_s", evaluations_per_s}};
   if (table) document["table"] = {{"rms_double", table->rms_double}, {"rms_float", table->rms_float}};
   document["passed"] = passed;

@@ -185,27 +185,40 @@ OperationCount count_operations(const Shader& shader) {
       for (const ShaderNode* operand : node->operands) self(self, operand);
       const int width = node->type == ShaderType::vector ? 3 : 1;
       switch (node->operation) {
-        case Operation::literal: case Operation::input: case Operation::component: case Operation::let:
-        case Operation::construct:
-          break;
-        case Operation::add: case Operation::subtract: case Operation::multiply: case Operation::negate:
-          total.add_multiply += width;
-          break;
+        case Operation::literal:
+        case Operation::input:
+        case Operation::component:
+        case Operation::let:
+        case Operation::construct: break;
+        case Operation::add:
+        case Operation::subtract:
+        case Operation::multiply:
+        case Operation::negate: total.add_multiply += width; break;
         case Operation::divide: total.divide += width; break;
-        case Operation::less: case Operation::greater: case Operation::less_equal: case Operation::greater_equal:
-        case Operation::select:
-          total.compare_select += width;
-          break;
+        case Operation::less:
+        case Operation::greater:
+        case Operation::less_equal:
+        case Operation::greater_equal:
+        case Operation::select: total.compare_select += width; break;
         case Operation::call: add(total, counts.at(node->name)); break;
         case Operation::intrinsic:
-          if (node->name == "dot") total.add_multiply += 5;
-          else if (node->name == "lerp") total.add_multiply += 3 * width;
-          else if (node->name == "normalize") { total.add_multiply += 8; total.square_root += 1; total.divide += 1; }
-          else if (node->name == "sqrt") total.square_root += width;
-          else if (node->name == "pow") { total.transcendental += 2; total.add_multiply += 1; }
-          else if (node->name == "exp" || node->name == "exp2" || node->name == "log" || node->name == "log2")
+          if (node->name == "dot")
+            total.add_multiply += 5;
+          else if (node->name == "lerp")
+            total.add_multiply += 3 * width;
+          else if (node->name == "normalize") {
+            total.add_multiply += 8;
+            total.square_root += 1;
+            total.divide += 1;
+          } else if (node->name == "sqrt")
+            total.square_root += width;
+          else if (node->name == "pow") {
+            total.transcendental += 2;
+            total.add_multiply += 1;
+          } else if (node->name == "exp" || node->name == "exp2" || node->name == "log" || node->name == "log2")
             total.transcendental += width;
-          else total.compare_select += width;  // min max abs saturate
+          else
+            total.compare_select += width;  // min max abs saturate
           break;
       }
     };

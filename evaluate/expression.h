@@ -26,8 +26,15 @@ enum class Operation {
   component,  // name: x, y or z of operands[0]
   let,        // name: a local that holds operands[0]
   construct,  // a vector from three scalars
-  add, subtract, multiply, divide, negate,
-  less, greater, less_equal, greater_equal,
+  add,
+  subtract,
+  multiply,
+  divide,
+  negate,
+  less,
+  greater,
+  less_equal,
+  greater_equal,
   select,     // operands[0] ? operands[1] : operands[2]
   intrinsic,  // name: min max abs saturate lerp sqrt exp exp2 log log2 pow dot normalize
   call,       // name: a traced function
@@ -153,16 +160,14 @@ template <class T>
 inline constexpr ShaderType type_of = is_vector<T> ? ShaderType::vector : ShaderType::scalar;
 
 template <class A, class B>
-concept VectorPair = (is_traced<A> || is_traced<B>) && (is_vector<A> || is_vector<B>);
+concept VectorPair = (is_traced<A> || is_traced<B>)&&(is_vector<A> || is_vector<B>);
 
 }  // namespace traced
 
-#define LOBEFIT_TRACED_OPERATOR(op, operation)                      \
-  template <class A, class B>                                       \
-    requires traced::VectorPair<A, B>                               \
-  Vec3<Expression> operator op(const A& a, const B& b) {            \
-    return traced::vector_operation(Operation::operation, a, b);    \
-  }
+#define LOBEFIT_TRACED_OPERATOR(op, operation)       \
+  template <class A, class B>                        \
+  requires traced::VectorPair<A, B> Vec3<Expression> \
+  operator op(const A& a, const B& b) { return traced::vector_operation(Operation::operation, a, b); }
 LOBEFIT_TRACED_OPERATOR(+, add)
 LOBEFIT_TRACED_OPERATOR(-, subtract)
 LOBEFIT_TRACED_OPERATOR(*, multiply)
@@ -177,8 +182,7 @@ Expression let(const char* name, Expression value);
 Vec3<Expression> let(const char* name, const Vec3<Expression>& value);
 
 template <class A, class B, class T>
-  requires(!Numeric<A, B, T>)
-auto lerp(const A& a, const B& b, const T& t) {
+requires(!Numeric<A, B, T>) auto lerp(const A& a, const B& b, const T& t) {
   using R = traced::Common<A, B>;
   return R(traced::intrinsic("lerp", traced::type_of<R>, {a, b, t}));
 }

@@ -25,7 +25,8 @@ const Language& find_language(std::string_view name) {
     if (language.name == name) return language;
     known += (known.empty() ? "" : ", ") + std::string(language.name);
   }
-  throw Error(ExitCode::usage, "unknown shader language '" + std::string(name) + "'", "--lang", "choose one of " + known);
+  throw Error(ExitCode::usage, "unknown shader language '" + std::string(name) + "'", "--lang",
+              "choose one of " + known);
 }
 
 std::string literal_text(double value) {
@@ -45,11 +46,10 @@ std::string upper_case(std::string text) {
 /// Names that a local must not take: the parameter struct's, and words that either language reserves or defines.
 const std::set<std::string>& reserved_names() {
   static const std::set<std::string> names{
-      "p",      "half",   "double",  "sample", "smooth", "flat",   "shared", "input",   "output", "common", "partition",
-      "active", "filter", "texture", "point",  "line",   "linear", "matrix", "vector",  "min",    "max",    "abs",
-      "clamp",  "lerp",   "mix",     "sqrt",   "exp",    "exp2",   "log",    "log2",    "pow",    "dot",    "normalize",
-      "cross",  "length", "step",    "fract",  "sign",   "mod",    "out",    "in",      "inout",  "discard",
-      "saturate"};
+      "p",      "half",   "double",  "sample", "smooth", "flat",   "shared", "input",  "output", "common",  "partition",
+      "active", "filter", "texture", "point",  "line",   "linear", "matrix", "vector", "min",    "max",     "abs",
+      "clamp",  "lerp",   "mix",     "sqrt",   "exp",    "exp2",   "log",    "log2",   "pow",    "dot",     "normalize",
+      "cross",  "length", "step",    "fract",  "sign",   "mod",    "out",    "in",     "inout",  "discard", "saturate"};
   return names;
 }
 
@@ -89,7 +89,9 @@ class FunctionPrinter {
  private:
   static bool is_atom(const ShaderNode& node) {
     switch (node.operation) {
-      case Operation::literal: case Operation::input: case Operation::component: return true;
+      case Operation::literal:
+      case Operation::input:
+      case Operation::component: return true;
       case Operation::negate: return is_atom(*node.operands[0]);
       default: return false;
     }

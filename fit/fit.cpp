@@ -62,6 +62,9 @@ struct Batch {
 
 constexpr std::size_t batch_size = 1024;
 
+/// The replicate whose numbers fits draw: a table rendered with the same seed has far fewer.
+constexpr std::uint32_t own_stream = ~0u;
+
 struct RobustResidual {
   double value, slope;
   double bend;  // by how much the pull on the parameters, value × slope, follows the data: its derivative over slope
@@ -93,7 +96,10 @@ class TableProblem {
  public:
   TableProblem(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
                const std::vector<double>& weights)
-      : dual_(dual_model(model)), table_(table), options_(options), on_table_(model, values, table, options.mappings),
+      : dual_(dual_model(model)),
+        table_(table),
+        options_(options),
+        on_table_(model, values, table, options.mappings),
         variables_(make_variables(values, on_table_, options, table.channels)) {
     for (std::size_t entry = 0; entry < table.entries(); ++entry) {
       if (weights[entry] == 0.0) continue;
@@ -123,8 +129,8 @@ class TableProblem {
     result.evaluate = [this](std::span<const double> x, std::span<double> residuals, double* jacobian) {
       return evaluate(x, residuals, jacobian);
     };
-    const bool has_errors = std::any_of(table_.stderr_values.begin(), table_.stderr_values.end(),
-                                        [](float error) { return error > 0.0f; });
+    const bool has_errors =
+        std::any_of(table_.stderr_values.begin(), table_.stderr_values.end(), [](float error) { return error > 0.0f; });
     if (has_errors) {
       result.degrees_of_freedom = table_.replicates.empty() ? 0 : replicate_count - 1;
       result.gradient_covariance = [this](std::span<const double> x, std::span<const double> jacobian) {
@@ -159,8 +165,9 @@ class TableProblem {
           for (std::size_t i = 0; i < n; ++i) {
             const std::size_t row = batch.first_residual + i * channels + c;
             const ValueAndSlope model = transform(options_.quantity, values[c * n + i], batch.cos_theta_i[i]);
-            const double target = transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)),
-                                            batch.cos_theta_i[i]).value;
+            const double target =
+                transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)), batch.cos_theta_i[i])
+                    .value;
             const RobustResidual residual = robust(options_.loss, options_.loss_scale, model.value - target);
             residuals[row] = batch.root_weight[i] * residual.value;
             if (!std::isfinite(residuals[row])) finite[index] = 0;
@@ -222,7 +229,8 @@ class TableProblem {
               transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)), batch.cos_theta_i[i]);
           const double model = transform(options_.quantity, values[c * n + i], batch.cos_theta_i[i]).value;
           slopes[batch.first_residual + i * channels + c] =
-              batch.root_weight[i] * target.slope * robust(options_.loss, options_.loss_scale, model - target.value).bend;
+              batch.root_weight[i] * target.slope *
+              robust(options_.loss, options_.loss_scale, model - target.value).bend;
         }
       }
     }
@@ -255,18 +263,19 @@ class TableProblem {
 std::vector<double> further_start(const Variables& variables, std::uint64_t seed, int index) {
   std::vector<double> start(variables.start.size());
   for (std::size_t i = 0; i < start.size(); ++i) {
-    const SamplePoints points(Sampler::sobol, {seed, i / 2, 0});
+    const SamplePoints points(Sampler::sobol, {seed, i / 2, own_stream});
     const double u = points(static_cast<std::uint32_t>(index))[i % 2];
     start[i] = variables.lower[i] + u * (variables.upper[i] - variables.lower[i]);
   }
   return start;
 }
 
-std::vector<FitMetric> all_metrics(const Table& table, std::span<const float> values, const std::vector<double>& weights) {
+std::vector<FitMetric> all_metrics(const Table& table, std::span<const float> values,
+                                   const std::vector<double>& weights) {
   std::vector<FitMetric> metrics;
   for (std::size_t q = 0; q < quantity_names.size(); ++q) {
-    metrics.push_back({std::string(quantity_names[q]),
-                       rms_difference(table, values, static_cast<Quantity>(q), weights)});
+    metrics.push_back(
+        {std::string(quantity_names[q]), rms_difference(table, values, static_cast<Quantity>(q), weights)});
   }
   return metrics;
 }
@@ -284,7 +293,8 @@ std::vector<std::string> free_parameters(const ParameterValues& values, const Ta
   const TableModel on_table(find_model(values.owner()), values, table, mappings);
   std::vector<std::string> names;
   for (const ParameterInfo& info : values.list()) {
-    if (info.tier <= tier && !on_table.set_by_axis(static_cast<std::size_t>(info.offset))) names.emplace_back(info.name);
+    if (info.tier <= tier && !on_table.set_by_axis(static_cast<std::size_t>(info.offset)))
+      names.emplace_back(info.name);
   }
   return names;
 }
@@ -296,7 +306,7 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
   if (options.holdout > 0.0) {
     held_out = weights;
     for (std::size_t entry = 0; entry < weights.size(); ++entry) {
-      const double u = SamplePoints(Sampler::philox, {options.seed, entry, 0})(0)[0];
+      const double u = SamplePoints(Sampler::philox, {options.seed, entry, own_stream})(0)[0];
       (u < options.holdout ? weights : held_out)[entry] = 0.0;
     }
     normalise(weights, "hold out a smaller fraction");
@@ -312,9 +322,10 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
   result.starts_tried = variables.names.empty() ? 1 : options.starts;
   monitor.begin("fit " + result.model, static_cast<std::uint64_t>(result.starts_tried));
   for (int start = 0; start < result.starts_tried; ++start) {
-    const LeastSquaresSolution solution = solve(
-        problem.problem(start == 0 ? variables.start : further_start(variables, options.seed, start)), monitor);
-    if (start == 0 || solution.sum_of_squares < result.solution.sum_of_squares) result.solution = solution;
+    const LeastSquaresSolution solution =
+        solve(problem.problem(start == 0 ? variables.start : further_start(variables, options.seed, start)), monitor);
+    // Written so that a first start without a finite sum loses to any other.
+    if (start == 0 || !(result.solution.sum_of_squares <= solution.sum_of_squares)) result.solution = solution;
     monitor.advance(1);
   }
   monitor.end();
@@ -328,13 +339,13 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
   for (const ParameterInfo& info : fitted.list()) {
     const auto offset = static_cast<std::size_t>(info.offset);
     if (on_table.set_by_axis(offset)) continue;
-    const bool grey = info.components == 1 ||
-                      (fitted.flat()[offset] == fitted.flat()[offset + 1] &&
-                       fitted.flat()[offset] == fitted.flat()[offset + 2] &&
-                       variables.variable_of_slot[offset] == variables.variable_of_slot[offset + 1]);
+    const bool grey =
+        info.components == 1 ||
+        (fitted.flat()[offset] == fitted.flat()[offset + 1] && fitted.flat()[offset] == fitted.flat()[offset + 2] &&
+         variables.variable_of_slot[offset] == variables.variable_of_slot[offset + 1]);
     for (std::size_t c = 0; c < (grey ? 1u : 3u); ++c) {
-      FitParameter parameter{.name = std::string(info.name) + (grey ? "" : channel_suffixes[c]),
-                             .lower = info.lower, .upper = info.upper};
+      FitParameter parameter{
+          .name = std::string(info.name) + (grey ? "" : channel_suffixes[c]), .lower = info.lower, .upper = info.upper};
       const int variable = variables.variable_of_slot[offset + c];
       parameter.free = variable >= 0;
       if (parameter.free) {
@@ -403,22 +414,26 @@ Json Fit::json(const std::string& command, const std::string& table_sha256) cons
     mapping_list.push_back({{"parameter", m.parameter}, {"axis", m.axis}, {"scale", m.scale}, {"power", m.power}});
   }
   std::vector<std::string_view> weights;
-  for (const WeightFactor factor : options.weights) weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
-  Json document{{"model", model},
-                {"params", list},
-                {"metrics", metrics_json(metrics)},
-                {"holdout", metrics_json(holdout)},
-                {"correlation", solution.correlation},
-                {"identifiable", solution.identifiable},
-                {"remarks", solution.remarks},
-                {"solver",
-                 {{"converged", solution.converged}, {"iterations", solution.iterations},
-                  {"starts", starts_tried}, {"message", solution.termination},
-                  {"metric", quantity_names[static_cast<std::size_t>(options.quantity)]}, {"weights", weights},
-                  {"loss", loss_names[static_cast<std::size_t>(options.loss)]}}},
-                {"provenance",
-                 {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", options.seed},
-                  {"table_sha256", table_sha256}}}};
+  for (const WeightFactor factor : options.weights)
+    weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
+  Json document{
+      {"model", model},
+      {"params", list},
+      {"metrics", metrics_json(metrics)},
+      {"holdout", metrics_json(holdout)},
+      {"correlation", solution.correlation},
+      {"identifiable", solution.identifiable},
+      {"remarks", solution.remarks},
+      {"solver",
+       {{"converged", solution.converged},
+        {"iterations", solution.iterations},
+        {"starts", starts_tried},
+        {"message", solution.termination},
+        {"metric", quantity_names[static_cast<std::size_t>(options.quantity)]},
+        {"weights", weights},
+        {"loss", loss_names[static_cast<std::size_t>(options.loss)]}}},
+      {"provenance",
+       {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", options.seed}, {"table_sha256", table_sha256}}}};
   if (!mappings.empty()) document["map"] = mapping_list;
   return document;
 }
@@ -447,7 +462,8 @@ Fit Fit::from_json(const Json& json, const std::string& place) {
     }
     if (reader.has("map")) {
       for (const JsonReader& m : reader.at("map").elements()) {
-        result.mappings.push_back({m.at("parameter").text(), m.at("axis").text(), m.at("scale").number(), m.at("power").number()});
+        result.mappings.push_back(
+            {m.at("parameter").text(), m.at("axis").text(), m.at("scale").number(), m.at("power").number()});
       }
     }
     result.values();

@@ -29,9 +29,9 @@ struct FitOptions {
   std::vector<WeightFactor> weights;
   Loss loss = Loss::none;
   double loss_scale = 0.05;
-  int starts = 1;           // > 1: further starts from a scrambled Sobol sequence over the ranges
-  double holdout = 0.0;     // fraction of entries kept out of the fit to be scored
-  std::uint64_t seed = 1;   // of starts and held-out entries
+  int starts = 1;          // > 1: further starts from a scrambled Sobol sequence over the ranges
+  double holdout = 0.0;    // fraction of entries kept out of the fit to be scored
+  std::uint64_t seed = 1;  // of starts and held-out entries
 };
 
 /// One number of the fitted model: an RGB parameter of a colour table counts three, "albedo.r" and so on.
@@ -51,8 +51,8 @@ struct Fit {
   std::string model;
   std::vector<FitParameter> parameters;  // those that no axis sets
   std::vector<AxisMapping> mappings;
-  std::vector<FitMetric> metrics;        // rms of every quantity over the fitted entries
-  std::vector<FitMetric> holdout;        // over the held-out ones
+  std::vector<FitMetric> metrics;  // rms of every quantity over the fitted entries
+  std::vector<FitMetric> holdout;  // over the held-out ones
   LeastSquaresSolution solution;
   FitOptions options;
   int starts_tried = 1;

@@ -20,7 +20,10 @@ constexpr std::size_t residuals_per_block = 1024;
 class Cache : public ceres::EvaluationCallback {
  public:
   Cache(const LeastSquaresProblem& problem, const double* x, Monitor& monitor)
-      : problem_(problem), x_(x), monitor_(monitor), residuals(problem.residual_count),
+      : problem_(problem),
+        x_(x),
+        monitor_(monitor),
+        residuals(problem.residual_count),
         jacobian(problem.residual_count * problem.names.size()) {}
 
   void PrepareForEvaluation(bool jacobians, bool new_point) override {
@@ -221,7 +224,8 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
       const Eigen::VectorXd column = (gradient(i, x[i] + step) - gradient(i, x[i] - step)) / (2.0 * step);
       hessian.col(k) = column(active);
     }
-    const Eigen::MatrixXd symmetric = scale.cwiseInverse().asDiagonal() * (0.5 * (hessian + hessian.transpose())).eval() *
+    const Eigen::MatrixXd symmetric = scale.cwiseInverse().asDiagonal() *
+                                      (0.5 * (hessian + hessian.transpose())).eval() *
                                       scale.cwiseInverse().asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> curvature(symmetric);
     const Eigen::VectorXd inverse_curvature =
@@ -232,10 +236,9 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
         scale.cwiseInverse().asDiagonal();
     data_covariance = inverse_hessian * gradient_covariance * inverse_hessian;
   }
-  const double quantile =
-      problem.degrees_of_freedom > 0
-          ? boost::math::quantile(boost::math::students_t(problem.degrees_of_freedom), 0.975)
-          : boost::math::quantile(boost::math::normal(), 0.975);
+  const double quantile = problem.degrees_of_freedom > 0
+                              ? boost::math::quantile(boost::math::students_t(problem.degrees_of_freedom), 0.975)
+                              : boost::math::quantile(boost::math::normal(), 0.975);
   for (Eigen::Index k = 0; k < m; ++k) {
     FittedVariable& variable = solution.variables[static_cast<std::size_t>(active[static_cast<std::size_t>(k)])];
     variable.misfit_standard_error = std::sqrt(variance * inverse_normal(k, k));
@@ -271,8 +274,10 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor)
       ceres_problem.AddResidualBlock(new Block(cache, first, count, variables), nullptr, x.data());
     }
     for (std::size_t i = 0; i < variables; ++i) {
-      if (std::isfinite(problem.lower[i])) ceres_problem.SetParameterLowerBound(x.data(), static_cast<int>(i), problem.lower[i]);
-      if (std::isfinite(problem.upper[i])) ceres_problem.SetParameterUpperBound(x.data(), static_cast<int>(i), problem.upper[i]);
+      if (std::isfinite(problem.lower[i]))
+        ceres_problem.SetParameterLowerBound(x.data(), static_cast<int>(i), problem.lower[i]);
+      if (std::isfinite(problem.upper[i]))
+        ceres_problem.SetParameterUpperBound(x.data(), static_cast<int>(i), problem.upper[i]);
     }
     ceres::Solver::Options options;
     // QR keeps the digits that ill-conditioned problems need; large ones are well overdetermined and can spare them.

@@ -52,7 +52,8 @@ Rival read_rival(const JsonReader& reader, const std::vector<Axis>& axes) {
   ParameterValues values = in_file(reader.at("model"), [&] { return find_model(rival.model).defaults(); });
   if (reader.has("set")) {
     set_parameters(values, reader.at("set"));
-    for (const auto& [name, member] : reader.at("set").members()) rival.set.emplace_back(name, number_or_numbers(member));
+    for (const auto& [name, member] : reader.at("set").members())
+      rival.set.emplace_back(name, number_or_numbers(member));
   }
   if (reader.has("map")) {
     for (const JsonReader& text : reader.at("map").elements()) {
@@ -82,7 +83,8 @@ RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_value
   RecipeRow row;
   row.model = reader.has("model") ? reader.at("model").text() : recipe_values.owner();
   const ParameterValues model_values =
-      reader.has("model") ? in_file(reader.at("model"), [&] { return find_model(row.model).defaults(); }) : recipe_values;
+      reader.has("model") ? in_file(reader.at("model"), [&] { return find_model(row.model).defaults(); })
+                          : recipe_values;
   if (!std::ranges::equal(model_values.list(), recipe_values.list(), {}, &ParameterInfo::name, &ParameterInfo::name)) {
     throw reader.at("model").error("'" + row.model + "' has other parameters than " + recipe_values.owner(),
                                    "name a variant of the recipe's model");
@@ -192,9 +194,11 @@ std::string conclude(const Recipe& recipe, const std::vector<RecipeResultRow>& r
     if (row.method != "exact" || row.free != row.row->free_sets.front()) continue;
     const double off = distance(row, recipe);
     if (off <= recipe.tolerance) {
-      reproducing += fmt::format("{}{} ({})", reproducing.empty() ? "" : " and ", row.row->name, constants_text(row, recipe));
+      reproducing +=
+          fmt::format("{}{} ({})", reproducing.empty() ? "" : " and ", row.row->name, constants_text(row, recipe));
     } else {
-      others += fmt::format("{}{} ({}; off by {:.4f})", others.empty() ? "" : ", ", row.row->name, constants_text(row, recipe), off);
+      others += fmt::format("{}{} ({}; off by {:.4f})", others.empty() ? "" : ", ", row.row->name,
+                            constants_text(row, recipe), off);
     }
   }
   if (reproducing.empty()) {
@@ -236,7 +240,8 @@ Recipe Recipe::read(const std::filesystem::path& path) {
     if (reader.has("samples")) {
       const double samples = reader.at("samples").number();
       if (!(samples >= replicate_count && samples <= static_cast<double>(most_samples))) {
-        throw reader.at("samples").error("out of range", fmt::format("choose from {} to {}", replicate_count, most_samples));
+        throw reader.at("samples").error("out of range",
+                                         fmt::format("choose from {} to {}", replicate_count, most_samples));
       }
       recipe.samples = static_cast<std::uint64_t>(samples);
     }
@@ -249,18 +254,22 @@ Recipe Recipe::read(const std::filesystem::path& path) {
     }
     recipe.tolerance = reader.at("tolerance").number();
     if (reader.has("rivals")) {
-      for (const JsonReader& rival : reader.at("rivals").elements()) recipe.rivals.push_back(read_rival(rival, recipe.parameter_axes));
+      for (const JsonReader& rival : reader.at("rivals").elements())
+        recipe.rivals.push_back(read_rival(rival, recipe.parameter_axes));
     }
-    for (const JsonReader& row : reader.at("rows").elements()) recipe.rows.push_back(read_row(row, recipe.fixed, recipe.parameter_axes));
+    for (const JsonReader& row : reader.at("rows").elements())
+      recipe.rows.push_back(read_row(row, recipe.fixed, recipe.parameter_axes));
     if (recipe.rows.empty()) throw reader.at("rows").error("the list is empty", "give at least one row");
     for (std::size_t i = 0; i < recipe.rows.size(); ++i) {
       const JsonReader row = reader.at("rows").elements()[i];
       for (std::size_t j = 0; j < i; ++j) {
         if (recipe.rows[j].name == recipe.rows[i].name) {
-          throw row.at("name").error("two rows are called '" + recipe.rows[i].name + "'", "names become file names: change one");
+          throw row.at("name").error("two rows are called '" + recipe.rows[i].name + "'",
+                                     "names become file names: change one");
         }
       }
-      if (recipe.rows[i].free_sets.empty()) throw row.at("free").error("the list is empty", "name the parameters to refit");
+      if (recipe.rows[i].free_sets.empty())
+        throw row.at("free").error("the list is empty", "name the parameters to refit");
       for (const Axis& axis : recipe.parameter_axes) {
         const JsonReader place = reader.at("axes").at(axis.name);
         if (in_file(place, [&] { return !recipe.rows[i].reference_values.info(axis.name).choices.empty(); })) {
@@ -315,11 +324,14 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
       for (const Rival& rival : recipe.rivals) rivals.push_back(score(rival, table, row, weights, monitor));
       for (const std::vector<std::string>& free : row.free_sets) {
         const FitOptions options{.free = free, .quantity = row.quantity, .weights = row.weights, .seed = seed};
-        RecipeResultRow line{.row = &row, .method = method,
-                             .table = static_cast<std::size_t>(known - result.tables.begin()), .free = free,
+        RecipeResultRow line{.row = &row,
+                             .method = method,
+                             .table = static_cast<std::size_t>(known - result.tables.begin()),
+                             .free = free,
                              .fit = fit(model, published, table, options, monitor),
                              .rms_published = rms_difference(table, published_values, row.quantity, weights),
-                             .published_values = published_values, .rivals = rivals};
+                             .published_values = published_values,
+                             .rivals = rivals};
         line.refit_values = TableModel(model, line.fit.values(), table).render().values;
         line.rms_refit = rms_difference(table, line.refit_values, row.quantity, weights);
         result.rows.push_back(std::move(line));
@@ -336,12 +348,14 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
     const RecipeRow& row = *line.row;
     Json reference{{"name", row.reference}};
     for (const ParameterInfo& info : row.reference_values.list()) {
-      if (!info.choices.empty()) reference[std::string(info.name)] = std::string(row.reference_values.choice(info.name));
+      if (!info.choices.empty())
+        reference[std::string(info.name)] = std::string(row.reference_values.choice(info.name));
     }
     Json axes = Json::object();
     for (const Axis& axis : recipe.parameter_axes) axes[axis.name] = axis.values;
     std::vector<std::string_view> weights;
-    for (const WeightFactor factor : row.weights) weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
+    for (const WeightFactor factor : row.weights)
+      weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
     Json parameters = Json::object(), fixed = Json::object();
     for (const FitParameter& p : line.fit.parameters) {
       if (!p.free) {
@@ -361,10 +375,14 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
                      {"model", row.model},
                      {"reference", reference},
                      {"domain",
-                      {{"views", row.views}, {"grid", row.grid_name}, {"axes", axes},
-                       {"theta_i", row.grid.theta_i.values}, {"theta_o", row.grid.theta_o.values},
+                      {{"views", row.views},
+                       {"grid", row.grid_name},
+                       {"axes", axes},
+                       {"theta_i", row.grid.theta_i.values},
+                       {"theta_o", row.grid.theta_o.values},
                        {"phi", row.grid.phi.values},
-                       {"metric", quantity_names[static_cast<std::size_t>(row.quantity)]}, {"weights", weights}}},
+                       {"metric", quantity_names[static_cast<std::size_t>(row.quantity)]},
+                       {"weights", weights}}},
                      {"method", line.method},
                      {"free", line.free},
                      {"fixed", fixed},
@@ -381,7 +399,8 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
           {"published", published},
           {"rows", lines},
           {"conclusion", conclusion},
-          {"provenance", {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", seed}, {"samples", recipe.samples}}}};
+          {"provenance",
+           {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", seed}, {"samples", recipe.samples}}}};
 }
 
 }  // namespace lobefit

@@ -40,9 +40,9 @@ struct RecipeRow {
 struct Recipe {
   std::string name, title, description;
   std::string model;
-  ParameterValues fixed;                                   // of the model, before anything is freed
-  std::vector<std::string> fixed_names;                    // those that the recipe states: they outrank the reference's
-  std::vector<std::pair<std::string, double>> published;   // constants to be checked
+  ParameterValues fixed;                                  // of the model, before anything is freed
+  std::vector<std::string> fixed_names;                   // those that the recipe states: they outrank the reference's
+  std::vector<std::pair<std::string, double>> published;  // constants to be checked
   std::vector<Axis> parameter_axes;
   std::uint64_t samples = 1u << 14;
   bool shared_facets = true;

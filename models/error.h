@@ -10,12 +10,12 @@ namespace lobefit {
 /// Exit codes of the command line; others script against them.
 enum class ExitCode {
   done = 0,
-  failure = 1,         // internal, or a write failed
-  usage = 2,           // the command line is wrong
-  invalid_input = 3,   // a file is unreadable or invalid
-  not_converged = 4,   // a fit stopped early; its result is written, marked
-  check_failed = 5,    // a check ran and exceeded its bound
-  missing_part = 6,    // a device or an optional part is absent
+  failure = 1,        // internal, or a write failed
+  usage = 2,          // the command line is wrong
+  invalid_input = 3,  // a file is unreadable or invalid
+  not_converged = 4,  // a fit stopped early; its result is written, marked
+  check_failed = 5,   // a check ran and exceeded its bound
+  missing_part = 6,   // a device or an optional part is absent
   interrupted = 130,
 };
 

@@ -46,11 +46,16 @@ inline constexpr ParameterInfo albedo_parameter{
     .name = "albedo", .symbol = "ρ", .initial = 1.0, .doc = "Diffuse reflectance, linear Rec.709 RGB."};
 inline constexpr ParameterInfo alpha_parameter{
     .name = "alpha", .symbol = "α", .initial = 0.5, .doc = "GGX alpha: the square of perceptual roughness."};
-inline constexpr ParameterInfo roughness_parameter{
-    .name = "roughness", .symbol = "r", .initial = 0.5, .doc = "Perceptual roughness; alpha is its square.",
-    .perceptual_roughness = true};
+inline constexpr ParameterInfo roughness_parameter{.name = "roughness",
+                                                   .symbol = "r",
+                                                   .initial = 0.5,
+                                                   .doc = "Perceptual roughness; alpha is its square.",
+                                                   .perceptual_roughness = true};
 inline constexpr ParameterInfo multiple_scattering_parameter{
-    .name = "multiple_scattering", .symbol = "w", .initial = 1.0, .tier = Tier::full,
+    .name = "multiple_scattering",
+    .symbol = "w",
+    .initial = 1.0,
+    .tier = Tier::full,
     .doc = "Weight of the model's own term for light that bounces more than once between facets; 0 leaves one bounce."};
 
 }  // namespace lobefit

@@ -26,7 +26,8 @@ int edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_name(std::string_view name, std::span<const std::string> names) {
-  const auto nearest = std::ranges::min_element(names, {}, [&](const std::string& n) { return edit_distance(name, n); });
+  const auto nearest =
+      std::ranges::min_element(names, {}, [&](const std::string& n) { return edit_distance(name, n); });
   return nearest == names.end() ? "" : *nearest;
 }
 
@@ -62,7 +63,8 @@ std::string number_text(double value) {
 
 ParameterValues::ParameterValues(std::vector<ParameterInfo> list, std::string owner)
     : list_(std::move(list)), owner_(std::move(owner)) {
-  for (const ParameterInfo& info : list_) flat_.insert(flat_.end(), static_cast<std::size_t>(info.components), info.initial);
+  for (const ParameterInfo& info : list_)
+    flat_.insert(flat_.end(), static_cast<std::size_t>(info.components), info.initial);
 }
 
 bool ParameterValues::has(std::string_view name) const {
@@ -84,9 +86,10 @@ void ParameterValues::set(std::string_view name, std::span<const double> compone
   const std::string where = owner_ + ", parameter " + std::string(name);
   const auto count = static_cast<std::size_t>(parameter.components);
   if (components.size() != 1 && components.size() != count) {
-    throw Error(ExitCode::usage, "expected " + (count == 1 ? std::string("one number") : "one number or three") +
-                ", got " + std::to_string(components.size()), where,
-                count == 1 ? "write NAME=VALUE" : "write NAME=VALUE or NAME=r,g,b");
+    throw Error(ExitCode::usage,
+                "expected " + (count == 1 ? std::string("one number") : "one number or three") + ", got " +
+                    std::to_string(components.size()),
+                where, count == 1 ? "write NAME=VALUE" : "write NAME=VALUE or NAME=r,g,b");
   }
   for (const double value : components) {
     // Written so that NaN fails too.

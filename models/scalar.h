@@ -104,8 +104,7 @@ LOBEFIT_TEXT constexpr auto saturate(const T& x) {
   return min(max(x, 0.0), 1.0);
 }
 template <class A, class B, class T>
-  requires Numeric<A, B, T>
-LOBEFIT_TEXT constexpr auto lerp(const A& a, const B& b, const T& t) {
+requires Numeric<A, B, T> LOBEFIT_TEXT constexpr auto lerp(const A& a, const B& b, const T& t) {
   return a + (b - a) * t;
 }
 
@@ -122,21 +121,21 @@ inline constexpr bool is_traced<Vec3<T>> = is_traced<T>;
 using Rgb = Vec3<double>;
 using Direction = Vec3<double>;
 
-#define LOBEFIT_VEC3_OPERATOR(op)                                                     \
-  template <class A, class B>                                                         \
-    requires NumericScalar<A> && NumericScalar<B>                                     \
-  LOBEFIT_TEXT constexpr auto operator op(const Vec3<A>& a, const Vec3<B>& b) {       \
-    return Vec3<decltype(a.x op b.x)>{a.x op b.x, a.y op b.y, a.z op b.z};            \
-  }                                                                                   \
-  template <class A, class B>                                                         \
-    requires NumericScalar<A> && NumericScalar<B>                                     \
-  LOBEFIT_TEXT constexpr auto operator op(const Vec3<A>& a, const B& b) {             \
-    return Vec3<decltype(a.x op b)>{a.x op b, a.y op b, a.z op b};                    \
-  }                                                                                   \
-  template <class A, class B>                                                         \
-    requires NumericScalar<A> && NumericScalar<B>                                     \
-  LOBEFIT_TEXT constexpr auto operator op(const A& a, const Vec3<B>& b) {             \
-    return Vec3<decltype(a op b.x)>{a op b.x, a op b.y, a op b.z};                    \
+#define LOBEFIT_VEC3_OPERATOR(op)                                                                           \
+  template <class A, class B>                                                                               \
+  requires NumericScalar<A> && NumericScalar<B> LOBEFIT_TEXT constexpr auto operator op(const Vec3<A>& a,   \
+                                                                                        const Vec3<B>& b) { \
+    return Vec3<decltype(a.x op b.x)>{a.x op b.x, a.y op b.y, a.z op b.z};                                  \
+  }                                                                                                         \
+  template <class A, class B>                                                                               \
+  requires NumericScalar<A> && NumericScalar<B> LOBEFIT_TEXT constexpr auto operator op(const Vec3<A>& a,   \
+                                                                                        const B& b) {       \
+    return Vec3<decltype(a.x op b)>{a.x op b, a.y op b, a.z op b};                                          \
+  }                                                                                                         \
+  template <class A, class B>                                                                               \
+  requires NumericScalar<A> && NumericScalar<B> LOBEFIT_TEXT constexpr auto operator op(const A& a,         \
+                                                                                        const Vec3<B>& b) { \
+    return Vec3<decltype(a op b.x)>{a op b.x, a op b.y, a op b.z};                                          \
   }
 LOBEFIT_VEC3_OPERATOR(+)
 LOBEFIT_VEC3_OPERATOR(-)
@@ -149,8 +148,7 @@ LOBEFIT_TEXT constexpr Vec3<T> operator-(const Vec3<T>& v) {
   return {-v.x, -v.y, -v.z};
 }
 template <class A, class B>
-  requires Numeric<A, B>
-LOBEFIT_TEXT constexpr auto dot(const Vec3<A>& a, const Vec3<B>& b) {
+requires Numeric<A, B> LOBEFIT_TEXT constexpr auto dot(const Vec3<A>& a, const Vec3<B>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <NumericScalar T>
@@ -174,10 +172,7 @@ LOBEFIT_TEXT constexpr Vec3<T> max(const Vec3<T>& a, double b) {
 
 /// Names an intermediate in the printed shader; the identity on numeric scalars.
 template <class T>
-  requires Numeric<T>
-LOBEFIT_TEXT constexpr const T& let(const char*, const T& value) {
-  return value;
-}
+requires Numeric<T> LOBEFIT_TEXT constexpr const T& let(const char*, const T& value) { return value; }
 
 /// How Expression turns a call into a function of the shader; defined in evaluate/expression.h.
 template <class F>

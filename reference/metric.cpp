@@ -71,7 +71,9 @@ std::vector<double> entry_weights(const Table& table, const std::vector<WeightFa
         case WeightFactor::sin_theta_o: weight *= std::sin(theta_o); break;
         case WeightFactor::cos_theta_i: weight *= std::cos(theta_i); break;
         case WeightFactor::cos_theta_o: weight *= std::cos(theta_o); break;
-        case WeightFactor::quadrature: weight *= weights_i[i] * weights_o[o] * weights_phi[table.phi_index(entry)]; break;
+        case WeightFactor::quadrature:
+          weight *= weights_i[i] * weights_o[o] * weights_phi[table.phi_index(entry)];
+          break;
         case WeightFactor::inverse_variance: {
           double variance = 0.0;
           for (int c = 0; c < table.channels; ++c) {
@@ -92,7 +94,8 @@ std::vector<double> entry_weights(const Table& table, const std::vector<WeightFa
   }
   const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
   if (!(sum > 0.0)) {
-    throw Error(ExitCode::invalid_input, "no entry carries weight", "", "every entry is masked, or lies where its weight is zero");
+    throw Error(ExitCode::invalid_input, "no entry carries weight", "",
+                "every entry is masked, or lies where its weight is zero");
   }
   for (double& weight : weights) weight /= sum;
   return weights;

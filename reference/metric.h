@@ -29,12 +29,15 @@ ValueAndSlope transform(Quantity quantity, double f, double cos_theta_i);
 
 /// A weight per table entry as a product of named factors; none means 1.
 enum class WeightFactor {
-  sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o,
+  sin_theta_i,
+  sin_theta_o,
+  cos_theta_i,
+  cos_theta_o,
   quadrature,        // the axes' own quadrature weights
   inverse_variance,  // 1/stderr² of the quantity
 };
-inline constexpr std::array<std::string_view, 6> weight_factor_names{"sin_theta_i", "sin_theta_o",  "cos_theta_i",
-                                                                     "cos_theta_o", "quadrature", "inverse_variance"};
+inline constexpr std::array<std::string_view, 6> weight_factor_names{"sin_theta_i", "sin_theta_o", "cos_theta_i",
+                                                                     "cos_theta_o", "quadrature",  "inverse_variance"};
 /// From "uniform" or names separated by commas; a name may repeat. Throws Error(usage).
 std::vector<WeightFactor> parse_weights(std::string_view text);
 

@@ -135,8 +135,8 @@ MicrofacetDiffuseSurface::MicrofacetDiffuseSurface(std::span<const double> flat)
 double MicrofacetDiffuseSurface::exact(const Direction& wi, const Direction& wo) const {
   const Direction seen = seen_from(wo);
   // The mean over visible normals is E[(wi·m)⁺] = K(wi, w) G1(w)/(w·n).
-  const double visible_mean = shared_visibility(distribution_, alpha_, wi, seen) /
-                              (seen.z * (1.0 + smith_lambda(distribution_, alpha_, seen)));
+  const double visible_mean =
+      shared_visibility(distribution_, alpha_, wi, seen) / (seen.z * (1.0 + smith_lambda(distribution_, alpha_, seen)));
   return weight(wi, wo) * visible_mean;
 }
 
@@ -158,8 +158,9 @@ double MicrofacetDiffuseSurface::weight(const Direction& wi, const Direction& wo
   return g2_over_g1 / (pi * wi.z);
 }
 
-void MicrofacetDiffuseSurface::sample_row(const Direction& wo, std::span<const Direction> wi, const SamplePoints& points,
-                                          std::uint32_t samples, std::span<double> values) const {
+void MicrofacetDiffuseSurface::sample_row(const Direction& wo, std::span<const Direction> wi,
+                                          const SamplePoints& points, std::uint32_t samples,
+                                          std::span<double> values) const {
   std::fill(values.begin(), values.end(), 0.0);
   const Direction seen = seen_from(wo);
   for (std::uint32_t k = 0; k < samples; ++k) {

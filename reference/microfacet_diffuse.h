@@ -27,9 +27,11 @@ struct MicrofacetDiffuse {
   static constexpr std::string_view name = "microfacet_diffuse";
   static constexpr std::string_view doc =
       "Lambertian facets under a GGX or Beckmann slope distribution with Smith masking, one bounce.";
-  static constexpr std::string_view source = "Heitz, Dupuy 2015, Implementing a Simple Anisotropic Rough Diffuse Material";
+  static constexpr std::string_view source =
+      "Heitz, Dupuy 2015, Implementing a Simple Anisotropic Rough Diffuse Material";
   static constexpr std::array<std::string_view, 2> distributions{"ggx", "beckmann"};
-  static constexpr std::array<std::string_view, 5> maskings{"correlated", "separable", "view_only", "none", "area_mean"};
+  static constexpr std::array<std::string_view, 5> maskings{"correlated", "separable", "view_only", "none",
+                                                            "area_mean"};
   static constexpr std::array<std::string_view, 1> bounce_choices{"1"};
 
   template <class T>
@@ -44,15 +46,25 @@ struct MicrofacetDiffuse {
   template <class P, class Visit>
   static constexpr void describe(P& p, Visit&& visit) {
     visit(p.albedo, albedo_parameter);
-    visit(p.alpha, ParameterInfo{.name = "alpha", .symbol = "α", .lower = 0.001, .upper = 1.0, .initial = 0.5,
-                                 .doc = "Roughness of the slope distribution: GGX alpha, or √2 times Beckmann's rms slope."});
-    visit(p.distribution, ParameterInfo{.name = "distribution", .upper = 1.0, .doc = "Slope distribution of the facets.",
+    visit(p.alpha,
+          ParameterInfo{.name = "alpha",
+                        .symbol = "α",
+                        .lower = 0.001,
+                        .upper = 1.0,
+                        .initial = 0.5,
+                        .doc = "Roughness of the slope distribution: GGX alpha, or √2 times Beckmann's rms slope."});
+    visit(p.distribution, ParameterInfo{.name = "distribution",
+                                        .upper = 1.0,
+                                        .doc = "Slope distribution of the facets.",
                                         .choices = distributions});
-    visit(p.masking, ParameterInfo{.name = "masking", .upper = 4.0,
-                                   .doc = "Smith masking and shadowing; area_mean is the view-independent mean over the surface.",
-                                   .choices = maskings});
-    visit(p.bounces, ParameterInfo{.name = "bounces", .upper = 0.0, .doc = "Scattering orders between facets.",
-                                   .choices = bounce_choices});
+    visit(p.masking,
+          ParameterInfo{.name = "masking",
+                        .upper = 4.0,
+                        .doc = "Smith masking and shadowing; area_mean is the view-independent mean over the surface.",
+                        .choices = maskings});
+    visit(p.bounces,
+          ParameterInfo{
+              .name = "bounces", .upper = 0.0, .doc = "Scattering orders between facets.", .choices = bounce_choices});
   }
 };
 

@@ -23,8 +23,8 @@ OutputFile::OutputFile(fs::path path, bool overwrite) : path_(std::move(path)) {
   if (!overwrite && fs::exists(path_, ignored)) {
     throw Error(ExitCode::usage, "output exists", path_.string(), "choose another name, or add --force to replace it");
   }
-  temporary_ = path_.parent_path() / ("." + path_.stem().string() + ".partial-" + std::to_string(getpid()) +
-                                      path_.extension().string());
+  temporary_ = path_.parent_path() /
+               ("." + path_.stem().string() + ".partial-" + std::to_string(getpid()) + path_.extension().string());
   // Tried now, so that hours of work are not spent on a result that can't be saved.
   std::ofstream probe(temporary_, std::ios::binary);
   if (!probe) {
@@ -72,7 +72,8 @@ std::string sha256_of_file(const fs::path& path) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
   unsigned int size = 0;
   if (EVP_Digest(content.data(), content.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1) {
-    throw Error(ExitCode::failure, "OpenSSL could not compute SHA-256", path.string(), "check the OpenSSL installation");
+    throw Error(ExitCode::failure, "OpenSSL could not compute SHA-256", path.string(),
+                "check the OpenSSL installation");
   }
   constexpr std::string_view digits = "0123456789abcdef";
   std::string text;

@@ -16,21 +16,23 @@ Reference make_microfacet_diffuse() {
           .doc = R::doc,
           .source = R::source,
           .parameters = describe_parameters<R>(),
-          .exact = [](std::span<const double> flat, const Direction& wi, const Direction& wo) {
-            return unflatten<R, double>(flat).albedo * MicrofacetDiffuseSurface(flat).exact(wi, wo);
-          },
-          .sample_row = [](std::span<const double> flat, const Direction& wo, std::span<const Direction> wi,
-                           const SamplePoints& points, std::uint32_t samples, bool fast, std::span<Rgb> values) {
-            const MicrofacetDiffuseSurface surface(flat);
-            std::vector<double> row(wi.size());
-            if (fast) {
-              surface.sample_row_fast(wo, wi, points, samples, row);
-            } else {
-              surface.sample_row(wo, wi, points, samples, row);
-            }
-            const Rgb albedo = unflatten<R, double>(flat).albedo;
-            for (std::size_t j = 0; j < row.size(); ++j) values[j] = albedo * row[j];
-          }};
+          .exact =
+              [](std::span<const double> flat, const Direction& wi, const Direction& wo) {
+                return unflatten<R, double>(flat).albedo * MicrofacetDiffuseSurface(flat).exact(wi, wo);
+              },
+          .sample_row =
+              [](std::span<const double> flat, const Direction& wo, std::span<const Direction> wi,
+                 const SamplePoints& points, std::uint32_t samples, bool fast, std::span<Rgb> values) {
+                const MicrofacetDiffuseSurface surface(flat);
+                std::vector<double> row(wi.size());
+                if (fast) {
+                  surface.sample_row_fast(wo, wi, points, samples, row);
+                } else {
+                  surface.sample_row(wo, wi, points, samples, row);
+                }
+                const Rgb albedo = unflatten<R, double>(flat).albedo;
+                for (std::size_t j = 0; j < row.size(); ++j) values[j] = albedo * row[j];
+              }};
 }
 
 }  // namespace
@@ -77,7 +79,8 @@ Estimate estimate(const Reference& reference, std::span<const double> flat, cons
     double worst = 0.0;
     for (std::size_t c = 0; c < 3; ++c) {
       std::array<double, replicate_count> column;
-      for (std::size_t r = 0; r < replicate_count; ++r) column[r] = c == 0 ? means[r].x : c == 1 ? means[r].y : means[r].z;
+      for (std::size_t r = 0; r < replicate_count; ++r)
+        column[r] = c == 0 ? means[r].x : c == 1 ? means[r].y : means[r].z;
       channel[c] = mean_and_error(std::span<const double>(column));
       worst = max(worst, channel[c].standard_error);
     }

@@ -34,8 +34,8 @@ Canvas make_canvas(const ParameterValues& values, std::vector<Axis> parameter_ax
     const bool is_axis = std::any_of(table.parameter_axes.begin(), table.parameter_axes.end(),
                                      [&](const Axis& axis) { return axis.name == info.name; });
     if (is_axis) continue;
-    const std::span<const double> slots = values.flat().subspan(static_cast<std::size_t>(info.offset),
-                                                                static_cast<std::size_t>(info.components));
+    const std::span<const double> slots =
+        values.flat().subspan(static_cast<std::size_t>(info.offset), static_cast<std::size_t>(info.components));
     if (!info.choices.empty()) {
       table.parameters[std::string(info.name)] = std::string(values.choice(info.name));
     } else if (info.components == 1) {
@@ -110,7 +110,8 @@ void sample_line(const Reference& reference, std::span<const double> flat, std::
       }
       store(table, first + j, mean);
     }
-    if (sampling.stderr_target > 0.0 && worst > sampling.stderr_target && sampling.samples * 2 <= most_samples) continue;
+    if (sampling.stderr_target > 0.0 && worst > sampling.stderr_target && sampling.samples * 2 <= most_samples)
+      continue;
     if (!table.sample_counts.empty()) {
       const auto count = static_cast<float>(std::uint64_t{sampling.per_replicate()} * replicate_count);
       std::fill_n(table.sample_counts.begin() + static_cast<std::ptrdiff_t>(first), n, count);

@@ -59,8 +59,9 @@ void check_angles(const JsonReader& reader, double upper, bool closed) {
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const double angle = angles[i];
     if (!(angle >= 0.0 && (closed ? angle <= upper : angle < upper))) {
-      throw reader.error(number_text(angle) + " is out of range", "choose angles from 0 to " +
-                         std::string(closed ? "" : "below ") + number_text(upper) + " degrees");
+      throw reader.error(
+          number_text(angle) + " is out of range",
+          "choose angles from 0 to " + std::string(closed ? "" : "below ") + number_text(upper) + " degrees");
     }
     if (i > 0 && !(angle > angles[i - 1])) {
       throw reader.error("angles do not increase", "sort them and remove repetitions");
@@ -136,8 +137,9 @@ Rgb Table::interpolate(std::size_t row, const Direction& light, const Direction&
   const auto locate = [](const Axis& axis, double angle) -> Place {
     constexpr double tolerance = 1e-6;  // degrees: the angle went through a cosine
     if (angle < axis.values.front() - tolerance || angle > axis.values.back() + tolerance) {
-      throw Error(ExitCode::usage, axis.name + " = " + number_text(angle) + " lies outside the table", "",
-                  "choose an angle from " + number_text(axis.values.front()) + " to " + number_text(axis.values.back()));
+      throw Error(
+          ExitCode::usage, axis.name + " = " + number_text(angle) + " lies outside the table", "",
+          "choose an angle from " + number_text(axis.values.front()) + " to " + number_text(axis.values.back()));
     }
     if (axis.size() == 1) return {0, 0.0};
     const auto above = std::upper_bound(axis.values.begin(), axis.values.end() - 1, angle);
@@ -146,11 +148,15 @@ Rgb Table::interpolate(std::size_t row, const Direction& light, const Direction&
     return {index, std::clamp(fraction, 0.0, 1.0)};
   };
   const auto polar = [](const Direction& w) { return degrees(std::atan2(std::hypot(w.x, w.y), w.z)); };
-  const double azimuth = degrees(std::abs(std::atan2(light.x * view.y - light.y * view.x, light.x * view.x + light.y * view.y)));
-  const Place i = locate(grid.theta_i, polar(light)), o = locate(grid.theta_o, polar(view)), k = locate(grid.phi, azimuth);
+  const double azimuth =
+      degrees(std::abs(std::atan2(light.x * view.y - light.y * view.x, light.x * view.x + light.y * view.y)));
+  const Place i = locate(grid.theta_i, polar(light)), o = locate(grid.theta_o, polar(view)),
+              k = locate(grid.phi, azimuth);
   std::array<double, 3> sum{};
   for (std::size_t corner = 0; corner < 8; ++corner) {
-    const auto step = [&](const Place& place, std::size_t bit) { return (corner >> bit & 1) != 0 ? place.fraction : 1.0 - place.fraction; };
+    const auto step = [&](const Place& place, std::size_t bit) {
+      return (corner >> bit & 1) != 0 ? place.fraction : 1.0 - place.fraction;
+    };
     const double weight = step(i, 0) * step(o, 1) * step(k, 2);
     if (weight == 0.0) continue;
     const std::size_t entry = (row * lines_per_parameter() + o.index + (corner >> 1 & 1)) * width() +
@@ -185,8 +191,11 @@ Table Table::row_slice(std::size_t row) const {
 Json Table::describe() const {
   Json axes = Json::array();
   const auto add = [&](const Axis& axis) {
-    axes.push_back({{"name", axis.name}, {"unit", axis.unit}, {"kind", axis.midpoints ? "midpoints" : "points"},
-                    {"values", axis.values}, {"weights", axis.weights()}});
+    axes.push_back({{"name", axis.name},
+                    {"unit", axis.unit},
+                    {"kind", axis.midpoints ? "midpoints" : "points"},
+                    {"values", axis.values},
+                    {"weights", axis.weights()}});
   };
   for (const Axis& axis : parameter_axes) add(axis);
   add(grid.theta_o);
@@ -200,8 +209,14 @@ Json Table::describe() const {
           {"masked", masked()},
           {"replicates", replicates.empty() ? 0 : replicate_count},
           {"provenance",
-           {{"reference", model}, {"params", parameters}, {"method", method}, {"seed", seed}, {"samples", samples},
-            {"shared_facets", shared_facets}, {"version", version}, {"command", command}}}};
+           {{"reference", model},
+            {"params", parameters},
+            {"method", method},
+            {"seed", seed},
+            {"samples", samples},
+            {"shared_facets", shared_facets},
+            {"version", version},
+            {"command", command}}}};
 }
 
 }  // namespace lobefit

@@ -44,19 +44,19 @@ struct Grid {
 struct Table {
   Grid grid;
   std::vector<Axis> parameter_axes;
-  int channels = 1;           // 1 (Y) or 3 (R, G, B)
-  std::string model;          // what was rendered: a reference's or a model's name
-  Json parameters;            // its parameters that are not axes
-  std::string method;         // "monte_carlo" or "exact"
+  int channels = 1;    // 1 (Y) or 3 (R, G, B)
+  std::string model;   // what was rendered: a reference's or a model's name
+  Json parameters;     // its parameters that are not axes
+  std::string method;  // "monte_carlo" or "exact"
   std::uint64_t seed = 0, samples = 0;
-  bool shared_facets = false; // a line's entries share their facets, so their errors are correlated
+  bool shared_facets = false;  // a line's entries share their facets, so their errors are correlated
   std::string version, command;
 
-  std::vector<float> values;       // [channel][entry]
+  std::vector<float> values;  // [channel][entry]
   std::vector<float> stderr_values;
-  std::vector<float> replicates;   // [replicate][channel][entry], or empty
+  std::vector<float> replicates;     // [replicate][channel][entry], or empty
   std::vector<float> sample_counts;  // [entry] where sampling was adaptive, or empty
-  std::vector<std::uint8_t> valid; // [entry]
+  std::vector<std::uint8_t> valid;   // [entry]
 
   std::size_t width() const { return grid.phi.size() * grid.theta_i.size(); }
   std::size_t lines_per_parameter() const { return grid.theta_o.size(); }
@@ -75,7 +75,9 @@ struct Table {
   }
   float replicate(int index, std::size_t entry, int channel = 0) const {
     return replicates[(static_cast<std::size_t>(index) * static_cast<std::size_t>(channels) +
-                       static_cast<std::size_t>(channel)) * entries() + entry];
+                       static_cast<std::size_t>(channel)) *
+                          entries() +
+                      entry];
   }
 
   std::size_t parameter_row(std::size_t entry) const { return entry / (width() * lines_per_parameter()); }

@@ -41,8 +41,8 @@ std::vector<Plane> planes(Table& table) {
     result.push_back({name, table.values.data() + offset});
     result.push_back({"stderr." + name, table.stderr_values.data() + offset});
     for (std::size_t r = 0; r * table.values.size() < table.replicates.size(); ++r) {
-      result.push_back({"replicate." + std::to_string(r) + "." + name,
-                        table.replicates.data() + r * table.values.size() + offset});
+      result.push_back(
+          {"replicate." + std::to_string(r) + "." + name, table.replicates.data() + r * table.values.size() + offset});
     }
   }
   if (!table.sample_counts.empty()) result.push_back({"samples", table.sample_counts.data()});
@@ -118,7 +118,8 @@ Table Table::read(const std::filesystem::path& path) {
     const Imf::Header& header = file.header();
     const auto attribute = [&](const char* name) -> std::string {
       const auto* found = header.findTypedAttribute<Imf::StringAttribute>(std::string("lobefit:") + name);
-      if (!found) throw invalid(path, std::string("an EXR picture, but not a lobefit table: no attribute lobefit:") + name);
+      if (!found)
+        throw invalid(path, std::string("an EXR picture, but not a lobefit table: no attribute lobefit:") + name);
       // Broken files put control characters here, which would cut or garble messages.
       std::string text = found->value();
       for (char& c : text) c = static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t' && c != '\r' ? '?' : c;
@@ -145,10 +146,14 @@ Table Table::read(const std::filesystem::path& path) {
       }
       if (axis.name == "theta_i" || axis.name == "theta_o") check_angles(reader.at("values"), 90.0, false);
       if (axis.name == "phi") check_angles(reader.at("values"), 180.0, true);
-      if (axis.name == "theta_i") table.grid.theta_i = axis;
-      else if (axis.name == "theta_o") table.grid.theta_o = axis;
-      else if (axis.name == "phi") table.grid.phi = axis;
-      else table.parameter_axes.push_back(axis);
+      if (axis.name == "theta_i")
+        table.grid.theta_i = axis;
+      else if (axis.name == "theta_o")
+        table.grid.theta_o = axis;
+      else if (axis.name == "phi")
+        table.grid.phi = axis;
+      else
+        table.parameter_axes.push_back(axis);
     }
     if (table.grid.theta_i.size() * table.grid.theta_o.size() * table.grid.phi.size() == 0) {
       throw invalid(path, "lobefit:axes lacks theta_i, theta_o or phi");
@@ -159,7 +164,8 @@ Table Table::read(const std::filesystem::path& path) {
     const auto height = static_cast<std::uint64_t>(std::int64_t{window.max.y} - window.min.y + 1);
     if (width != table.width() || height != table.height() || window.min.x != 0 || window.min.y != 0) {
       throw invalid(path, "the picture is " + std::to_string(width) + " × " + std::to_string(height) +
-                              ", its axes say " + std::to_string(table.width()) + " × " + std::to_string(table.height()));
+                              ", its axes say " + std::to_string(table.width()) + " × " +
+                              std::to_string(table.height()));
     }
     // Deflate packs at most 1032 : 1, so a file also bounds what may be allocated for it.
     double bytes = 0.0;

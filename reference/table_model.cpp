@@ -44,7 +44,8 @@ TableModel::TableModel(const Model& model, const ParameterValues& values, const 
     }
     const auto rough = std::find_if(values.list().begin(), values.list().end(),
                                     [](const ParameterInfo& info) { return info.perceptual_roughness; });
-    if (axis.name == "alpha" && rough != values.list().end()) all.push_back({std::string(rough->name), "alpha", 1.0, 0.5});
+    if (axis.name == "alpha" && rough != values.list().end())
+      all.push_back({std::string(rough->name), "alpha", 1.0, 0.5});
     // A model without roughness, such as Lambert, is the same in every row.
   }
   for (const AxisMapping& mapping : all) {

@@ -24,7 +24,8 @@ struct AxisMapping {
 class TableModel {
  public:
   /// An axis sets the model's parameter of its name, a perceptual roughness its root of the axis alpha; mappings come
-  /// first. Throws Error(usage) if an axis reaches no parameter.
+  /// first. An axis that reaches no parameter changes nothing: Lambert is the same at every alpha, and EON's own
+  /// roughness follows an axis alpha only by a mapping. Throws Error(usage) for a mapping of an axis the table lacks.
   TableModel(const Model& model, const ParameterValues& values, const Table& table,
              const std::vector<AxisMapping>& mappings = {});
 

@@ -21,7 +21,8 @@ void write_false_colour(std::span<const float> values, std::size_t width, std::s
   }
   const auto write = reinterpret_cast<WriteFalseColour*>(dlsym(module, write_false_colour_symbol));
   if (!write) {
-    throw Error(ExitCode::missing_part, "the picture module is of another version", image_module_name, "build lobefit again");
+    throw Error(ExitCode::missing_part, "the picture module is of another version", image_module_name,
+                "build lobefit again");
   }
   std::string failure;
   if (!write(values, width, height, file.temporary(), failure)) {

@@ -45,7 +45,8 @@ class CommandLine : public ::testing::Test {
   Outcome run(const std::string& arguments) const {
     const std::string command = "cd '" + folder_.string() + "' && '" LOBEFIT_PROGRAM "' " + arguments + " >.out 2>.err";
     const int status = std::system(command.c_str());
-    const Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder_ / ".out"), content(folder_ / ".err")};
+    const Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(folder_ / ".out"),
+                          content(folder_ / ".err")};
     fs::remove(folder_ / ".out");
     fs::remove(folder_ / ".err");
     return outcome;
@@ -169,7 +170,8 @@ TEST_F(CommandLine, EvalAnswersPairsAndFiles) {
   std::ofstream(folder_ / "pairs.csv") << "name,theta_i,phi_i,theta_o,phi_o\nfirst,10,0,20,0\nsecond,30,0,40,180\n";
   const Outcome csv = run("eval lambert --csv pairs.csv");
   EXPECT_EQ(csv.code, 0) << csv.err;
-  EXPECT_TRUE(csv.out.starts_with("name,theta_i,phi_i,theta_o,phi_o,r,g,b\nfirst,10,0,20,0,0.31830988618379")) << csv.out;
+  EXPECT_TRUE(csv.out.starts_with("name,theta_i,phi_i,theta_o,phi_o,r,g,b\nfirst,10,0,20,0,0.31830988618379"))
+      << csv.out;
   std::ofstream(folder_ / "bad.csv") << "theta_i,phi_i,theta_o,phi_o\n10,0,20,0\n10,0,95,0\n";
   const Outcome bad = run("eval lambert --csv bad.csv");
   EXPECT_EQ(bad.code, 3);
@@ -212,7 +214,8 @@ TEST_F(CommandLine, FitCheckExportHangTogether) {
   EXPECT_LT(check["table"]["rms_float"], 1e-6);
   const Outcome shader = run("export fit.json --lang hlsl");
   EXPECT_EQ(shader.code, 0);
-  EXPECT_NE(shader.out.find("float3 Lobefit_proxima(float3 wi, float3 wo, Lobefit_proxima_Parameters p)"), std::string::npos);
+  EXPECT_NE(shader.out.find("float3 Lobefit_proxima(float3 wi, float3 wo, Lobefit_proxima_Parameters p)"),
+            std::string::npos);
   EXPECT_NE(shader.out.find("Lobefit_proxima_Fitted()"), std::string::npos);
   EXPECT_NE(shader.out.find("p.b = 0.11"), std::string::npos) << shader.out;
   expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl"});
@@ -233,7 +236,7 @@ TEST_F(CommandLine, CompareExitsWithFiveBeyondTheTolerance) {
   // π f cos θ differs by 0.1 cos θ: the mean square of the cosine over 0, 10, …, 80° is known.
   double squares = 0.0;
   for (int i = 0; i < 9; ++i) squares += std::pow(0.1 * std::cos(i * 10.0 * 0.017453292519943295), 2) / 9.0;
-  EXPECT_NEAR(json("table compare a.exr b.exr")["rms"]["cosine"], std::sqrt(squares), 1e-7);
+  EXPECT_NEAR(json("table compare a.exr b.exr")["metrics"]["cosine"], std::sqrt(squares), 1e-7);
   EXPECT_EQ(run("table compare a.exr b.exr --tolerance 0.2").code, 0);
   EXPECT_EQ(run("table compare a.exr b.exr --tolerance 0.01").code, 5);
   ASSERT_EQ(run("render lambert --grid default -o c.exr").code, 0);
@@ -244,14 +247,16 @@ TEST_F(CommandLine, ModelsDescribeThemselves) {
   const Json all = json("models")["models"];
   EXPECT_GE(all.size(), 8u);
   for (const Json& model : all) {
-    for (const char* key : {"name", "kind", "params", "source", "properties", "operations"}) EXPECT_TRUE(model.contains(key)) << model;
+    for (const char* key : {"name", "kind", "params", "source", "properties", "operations"})
+      EXPECT_TRUE(model.contains(key)) << model;
     for (const Json& parameter : model["params"]) {
       EXPECT_FALSE(parameter["doc"].get<std::string>().empty()) << parameter;
       EXPECT_LE(parameter["range"][0], parameter["default"]) << parameter;
       EXPECT_LE(parameter["default"], parameter["range"][1]) << parameter;
     }
   }
-  for (const char* verb : {"models", "eval", "albedo", "references", "reference", "render", "table", "fit", "refit", "check", "export", "plot"}) {
+  for (const char* verb : {"models", "eval", "albedo", "references", "reference", "render", "table", "fit", "refit",
+                           "check", "export", "plot"}) {
     const Outcome help = run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find(verb), std::string::npos);
@@ -259,7 +264,8 @@ TEST_F(CommandLine, ModelsDescribeThemselves) {
 }
 
 TEST_F(CommandLine, ReadingAnUnfinishedRecipeNamesTheJsonPath) {
-  std::ofstream(folder_ / "r.json") << R"({"recipe":"r","title":"t","description":"d","model":"proxima","published":{"a":-0.5},
+  std::ofstream(folder_ / "r.json")
+      << R"({"recipe":"r","title":"t","description":"d","model":"proxima","published":{"a":-0.5},
     "axes":{"alpha":[0.5]},"tolerance":0.01,"rows":[{"name":"n","views":"all","reference":{"name":"microfacet_diffuse"},
     "grid":"small","metric":"cosine","weights":"uniform","free":[["a","gamma"]]}]})";
   expect_refused("refit r.json -o out", 3, {"r.json", "$.rows[0].free[0][1]", "gamma"});

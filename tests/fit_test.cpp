@@ -400,6 +400,42 @@ TEST(Fits, TakeCorrelatedErrorsFromReplicates) {
   EXPECT_NEAR(without.standard_error, error / std::sqrt(static_cast<double>(table.entries())), 1e-6);
 }
 
+TEST(Fits, StateHowFarTheirConstantsMoveWithTheData) {
+  // An error in one entry alone: the standard error is what the constant moves when that entry does, and refitting
+  // tells. With models that are not linear and do not meet the table, JᵀJ alone would get this wrong.
+  const Table clean = render_reference("correlated", {}, small_grid());
+  struct Case {
+    const char* model;
+    const char* constant;
+    Quantity quantity;
+    Loss loss;
+  };
+  for (const Case& c : {Case{"oren_nayar", "sigma", Quantity::cosine, Loss::none},
+                        Case{"oren_nayar", "sigma", Quantity::log, Loss::none},
+                        Case{"oren_nayar", "sigma", Quantity::cube_root, Loss::none},
+                        Case{"hammon", "alpha", Quantity::cosine, Loss::cauchy}}) {
+    const Model& model = find_model(c.model);
+    const FitOptions options{.free = {c.constant}, .quantity = c.quantity, .loss = c.loss, .loss_scale = 0.05};
+    const Fit start = fit(model, model.defaults(), clean, options, silent);
+    ASSERT_FALSE(parameter(start, c.constant).estimate.at_bound) << c.model;
+    for (const std::size_t entry : {std::size_t{2}, std::size_t{40}, std::size_t{87}, std::size_t{130}}) {
+      const auto constant_with = [&](float entry_value) {
+        Table moved = clean;
+        moved.values[entry] = entry_value;
+        return value(fit(model, start.values(), moved, options, silent), c.constant);
+      };
+      const float error = 1e-3f * clean.value(entry);
+      const float up = clean.value(entry) + 5.0f * error, down = clean.value(entry) - 5.0f * error;
+      const double slope = (constant_with(up) - constant_with(down)) / (static_cast<double>(up) - down);
+      Table table = clean;
+      table.stderr_values[entry] = error;
+      const double stated =
+          parameter(fit(model, start.values(), table, options, silent), c.constant).estimate.standard_error;
+      EXPECT_NEAR(stated / (std::abs(slope) * error), 1.0, 0.01) << c.model << ", entry " << entry;
+    }
+  }
+}
+
 TEST(Fits, OfUnclampedProximaAreLinearLeastSquares) {
   // On the slice V = N the fade is 1 and f μi π - μi = a α μi + b α: two columns, solved by Eigen. formulas.md §2 has
   // the result for Smith-correlated masking.

@@ -17,12 +17,13 @@ struct SchlickScale {
 };
 
 struct Burley {
-  static constexpr ModelInfo info{.name = "burley",
-                                  .title = "Burley (Disney) diffuse",
-                                  .source = "Burley 2012, Physically Based Shading at Disney, section 5.3",
-                                  .reciprocal = true,
-                                  .energy_conserving = false,
-                                  .doc = "Two Schlick factors whose grazing value rises with roughness, fitted by eye to MERL."};
+  static constexpr ModelInfo info{
+      .name = "burley",
+      .title = "Burley (Disney) diffuse",
+      .source = "Burley 2012, Physically Based Shading at Disney, section 5.3",
+      .reciprocal = true,
+      .energy_conserving = false,
+      .doc = "Two Schlick factors whose grazing value rises with roughness, fitted by eye to MERL."};
 
   template <class T>
   struct Parameters {

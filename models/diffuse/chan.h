@@ -6,14 +6,15 @@
 namespace lobefit {
 
 struct Chan2018 {
-  static constexpr ModelInfo info{.name = "chan_2018",
-                                  .title = "Chan 2018 diffuse (Call of Duty: WWII; Substrate's opaque diffuse)",
-                                  .source = "Chan 2018, Material Advances in Call of Duty: WWII, SIGGRAPH course",
-                                  .reciprocal = true,
-                                  .energy_conserving = false,
-                                  // The bump's quadratic in gloss is negative around gloss 0.8, and nothing clamps it.
-                                  .non_negative = false,
-                                  .doc = "Fit to multiple-scattering GGX diffuse facets, interpolated over gloss; gains energy in the furnace."};
+  static constexpr ModelInfo info{
+      .name = "chan_2018",
+      .title = "Chan 2018 diffuse (Call of Duty: WWII; Substrate's opaque diffuse)",
+      .source = "Chan 2018, Material Advances in Call of Duty: WWII, SIGGRAPH course",
+      .reciprocal = true,
+      .energy_conserving = false,
+      // The bump's quadratic in gloss is negative around gloss 0.8, and nothing clamps it.
+      .non_negative = false,
+      .doc = "Fit to multiple-scattering GGX diffuse facets, interpolated over gloss; gains energy in the furnace."};
 
   template <class T>
   struct Parameters {
@@ -47,8 +48,9 @@ struct Chan2024 {
                                   .source = "Unpublished; as found in engine sources of 2024",
                                   .reciprocal = true,
                                   .energy_conserving = false,
-                                  .doc = "Half-vector fit to GGX diffuse facets. Its last term, .38 alpha, stands for "
-                                         "further bounces but carries no second albedo in engine copies."};
+                                  .doc =
+                                      "Half-vector fit to GGX diffuse facets. Its last term, .38 alpha, stands for "
+                                      "further bounces but carries no second albedo in engine copies."};
 
   template <class T>
   struct Parameters {

@@ -15,18 +15,20 @@ struct EonAlbedo {
     // G = S (θ - S μ) + ⅔ ((S/μ)(1 - S³) - S). With 1 - S = μ²/(1 + S) the quotient loses its cancellation and its
     // pole at grazing angles.
     const auto quotient = sin_theta * cos_theta * (1.0 + sin_theta + sin_theta * sin_theta) / (1.0 + sin_theta);
-    const auto g = let("g", sin_theta * (acos(cos_theta) - sin_theta * cos_theta) + (2.0 / 3.0) * (quotient - sin_theta));
+    const auto g =
+        let("g", sin_theta * (acos(cos_theta) - sin_theta * cos_theta) + (2.0 / 3.0) * (quotient - sin_theta));
     return a_f * (1.0 + roughness * g / pi);
   }
 };
 
 struct Eon {
-  static constexpr ModelInfo info{.name = "eon",
-                                  .title = "EON diffuse (energy-preserving Oren-Nayar)",
-                                  .source = "Portsmouth, Kutz, Hill 2024, EON: A Practical Energy-Preserving Rough Diffuse BRDF",
-                                  .reciprocal = true,
-                                  .energy_conserving = true,
-                                  .doc = "Fujii's improved Oren-Nayar lobe plus the lobe that returns the energy it loses."};
+  static constexpr ModelInfo info{
+      .name = "eon",
+      .title = "EON diffuse (energy-preserving Oren-Nayar)",
+      .source = "Portsmouth, Kutz, Hill 2024, EON: A Practical Energy-Preserving Rough Diffuse BRDF",
+      .reciprocal = true,
+      .energy_conserving = true,
+      .doc = "Fujii's improved Oren-Nayar lobe plus the lobe that returns the energy it loses."};
 
   template <class T>
   struct Parameters {
@@ -38,8 +40,12 @@ struct Eon {
   template <class P, class Visit>
   static constexpr void describe(P& p, Visit&& visit) {
     visit(p.albedo, albedo_parameter);
-    visit(p.roughness, ParameterInfo{.name = "roughness", .symbol = "r", .initial = 0.5,
-                                     .doc = "EON's own roughness, linear in Oren-Nayar's sigma; 0.4 sqrt(alpha) is near GGX facets."});
+    visit(
+        p.roughness,
+        ParameterInfo{.name = "roughness",
+                      .symbol = "r",
+                      .initial = 0.5,
+                      .doc = "EON's own roughness, linear in Oren-Nayar's sigma; 0.4 sqrt(alpha) is near GGX facets."});
     visit(p.multiple_scattering, multiple_scattering_parameter);
   }
 

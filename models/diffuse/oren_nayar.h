@@ -6,14 +6,15 @@
 namespace lobefit {
 
 struct OrenNayar {
-  static constexpr ModelInfo info{.name = "oren_nayar",
-                                  .title = "Oren-Nayar diffuse, full form",
-                                  .source = "Oren, Nayar 1994, Generalization of Lambert's Reflectance Model, equations 27-30",
-                                  .reciprocal = true,
-                                  // Both fail at grazing angles: the fit behind C2 tan B overshoots there.
-                                  .energy_conserving = false,
-                                  .non_negative = false,
-                                  .doc = "Lambertian V-grooves with Gaussian slopes: shadowing, masking and a second bounce."};
+  static constexpr ModelInfo info{
+      .name = "oren_nayar",
+      .title = "Oren-Nayar diffuse, full form",
+      .source = "Oren, Nayar 1994, Generalization of Lambert's Reflectance Model, equations 27-30",
+      .reciprocal = true,
+      // Both fail at grazing angles: the fit behind C2 tan B overshoots there.
+      .energy_conserving = false,
+      .non_negative = false,
+      .doc = "Lambertian V-grooves with Gaussian slopes: shadowing, masking and a second bounce."};
 
   template <class T>
   struct Parameters {
@@ -25,7 +26,11 @@ struct OrenNayar {
   template <class P, class Visit>
   static constexpr void describe(P& p, Visit&& visit) {
     visit(p.albedo, albedo_parameter);
-    visit(p.sigma, ParameterInfo{.name = "sigma", .symbol = "σ", .unit = "rad", .upper = pi / 2.0, .initial = 0.3,
+    visit(p.sigma, ParameterInfo{.name = "sigma",
+                                 .symbol = "σ",
+                                 .unit = "rad",
+                                 .upper = pi / 2.0,
+                                 .initial = 0.3,
                                  .doc = "Standard deviation of the facets' slope angles."});
     visit(p.multiple_scattering, multiple_scattering_parameter);
   }

@@ -30,13 +30,26 @@ template <class P, class Visit>
 constexpr void describe_proxima(P& p, Visit&& visit) {
   visit(p.albedo, albedo_parameter);
   visit(p.alpha, alpha_parameter);
-  visit(p.a, ParameterInfo{.name = "a", .lower = -2.0, .upper = 2.0, .initial = -0.55, .tier = Tier::full,
+  visit(p.a, ParameterInfo{.name = "a",
+                           .lower = -2.0,
+                           .upper = 2.0,
+                           .initial = -0.55,
+                           .tier = Tier::full,
                            .doc = "Constant part of the roughness term."});
-  visit(p.b, ParameterInfo{.name = "b", .lower = -2.0, .upper = 2.0, .initial = 0.19, .tier = Tier::full,
+  visit(p.b, ParameterInfo{.name = "b",
+                           .lower = -2.0,
+                           .upper = 2.0,
+                           .initial = 0.19,
+                           .tier = Tier::full,
                            .doc = "Part of the roughness term that grows as 1/cos theta_i."});
   // Below 0.2 the guarded pow(0, e) would no longer vanish.
-  visit(p.exponent, ParameterInfo{.name = "exponent", .symbol = "e", .lower = 0.2, .upper = 16.0, .initial = 0.5,
-                                  .tier = Tier::full, .doc = "Exponent of the fade in cos theta_k = -dot(V, L)."});
+  visit(p.exponent, ParameterInfo{.name = "exponent",
+                                  .symbol = "e",
+                                  .lower = 0.2,
+                                  .upper = 16.0,
+                                  .initial = 0.5,
+                                  .tier = Tier::full,
+                                  .doc = "Exponent of the fade in cos theta_k = -dot(V, L)."});
 }
 
 struct Proxima {
@@ -46,7 +59,9 @@ struct Proxima {
       .source = "Jimenez et al. 2023, The Character Rendering Art of The Callisto Protocol, slides 125-128",
       .reciprocal = false,
       .energy_conserving = false,
-      .doc = "Lambert plus a term in the light's angle that fades out where light and view oppose each other, clamped at 0."};
+      .doc =
+          "Lambert plus a term in the light's angle that fades out where light and view oppose each other, clamped at "
+          "0."};
 
   template <class T>
   using Parameters = ProximaParameters<T>;
@@ -70,7 +85,9 @@ struct ProximaUnclamped {
       .reciprocal = false,
       .energy_conserving = false,
       .non_negative = false,
-      .doc = "As proxima, but negative where its factor is: linear in a and b, so that their fit is plain linear least squares."};
+      .doc =
+          "As proxima, but negative where its factor is: linear in a and b, so that their fit is plain linear least "
+          "squares."};
 
   template <class T>
   using Parameters = ProximaParameters<T>;
