@@ -36,22 +36,20 @@ void parse_loss(const std::string& text, FitOptions& options) {
 /// Which parameters are free, and the values of the others.
 std::vector<std::string> choose_free(const FitArguments& a, const Table& table, const FitOptions& options,
                                      ParameterValues& values) {
-  std::vector<std::string> fixed;
-  for (const std::string& text : a.fix) {
-    const std::size_t equals = text.find('=');
-    fixed.push_back(text.substr(0, equals));
-    values.info(fixed.back());
-    if (equals != std::string::npos) values.set_text(fixed.back(), std::string_view(text).substr(equals + 1));
-  }
-  std::vector<std::string> free;
-  if (!a.free.empty()) {
-    for (const std::string& text : a.free) {
+  // NAME or NAME=VALUE: the names, their values set.
+  const auto names_of = [&](const std::vector<std::string>& texts) {
+    std::vector<std::string> names;
+    for (const std::string& text : texts) {
       const std::size_t equals = text.find('=');
-      free.push_back(text.substr(0, equals));
-      values.info(free.back());
-      if (equals != std::string::npos) values.set_text(free.back(), std::string_view(text).substr(equals + 1));
+      names.push_back(text.substr(0, equals));
+      values.info(names.back());
+      if (equals != std::string::npos) values.set_text(names.back(), std::string_view(text).substr(equals + 1));
     }
-  } else {
+    return names;
+  };
+  const std::vector<std::string> fixed = names_of(a.fix);
+  std::vector<std::string> free = names_of(a.free);
+  if (a.free.empty()) {
     const Tier tier = a.tier == "base" ? Tier::base : a.tier == "advanced" ? Tier::advanced : Tier::full;
     const bool from_reference = find_reference_or_null(table.model) != nullptr;
     for (const std::string& name : free_parameters(values, table, options.mappings, tier)) {

@@ -14,7 +14,7 @@ class OutputFolder {
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
 
-  /// Where to write a file of this name for now.
+  /// Where to write a file of this name before commit().
   std::filesystem::path path(const std::string& name) const { return staging_ / name; }
   const std::filesystem::path& destination() const { return destination_; }
   /// Moves the files in; others that the destination holds stay.
