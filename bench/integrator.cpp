@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "bench/benchmarks.h"
-#include "reference/microfacet_diffuse.h"
+#include "reference/diffuse/microfacet_diffuse.h"
 #include "reference/references.h"
 #include "reference/visible_normals.h"
 
@@ -18,11 +18,11 @@ constexpr std::uint32_t facet_count = 2048;  // one replicate of the default num
 constexpr std::size_t line_size = 18 * 19;   // lights that share a view in the default grid
 const Direction view = direction(radians(50.0), 0.0);
 
-MicrofacetDiffuseSurface make_surface(std::string_view distribution) {
+std::shared_ptr<const Integrator> make_surface(std::string_view distribution) {
   ParameterValues values = find_reference(MicrofacetDiffuse::name).defaults();
   values.set("alpha", alpha);
   values.set_text("distribution", distribution);
-  return MicrofacetDiffuseSurface(values.flat());
+  return find_reference(MicrofacetDiffuse::name).make(values);
 }
 
 /// A spiral from the normal to 85°.
@@ -62,13 +62,10 @@ void add_row(const std::string& name, const std::string& baseline, Arithmetic ar
   add(name, baseline, facet_count * light_count,
       [=, surface = make_surface("ggx"), lights = spread_lights(light_count),
        points = SamplePoints(Sampler::sobol, {})] {
-        std::vector<double> values(light_count);
-        if (arithmetic == Arithmetic::vector_float) {
-          surface.sample_row_fast(view, lights, points, facet_count, values);
-        } else {
-          surface.sample_row(view, lights, points, facet_count, values);
-        }
-        return values.back();
+        std::vector<Rgb> values(light_count);
+        surface->sample_row(view, lights, points, facet_count, arithmetic == Arithmetic::vector_float,
+                            {.values = values});
+        return values.back().x;
       });
 }
 
@@ -76,7 +73,7 @@ void add_exact(const std::string& name, std::string_view distribution) {
   constexpr std::size_t count = 64;
   add(name, "", count, [surface = make_surface(distribution), lights = spread_lights(count)] {
     double sum = 0.0;
-    for (const Direction& light : lights) sum += surface.exact(light, view);
+    for (const Direction& light : lights) sum += surface->exact(light, view).x;
     return sum;
   });
 }

@@ -36,13 +36,17 @@ std::vector<Axis> parse_axes(const std::vector<std::string>& texts) {
   return axes;
 }
 
-Direction parse_direction(const std::string& text, const char* option) {
+Direction parse_direction(const std::string& text, const char* option, bool sphere) {
   const std::vector<double> angles = parse_numbers(text, option);
   if (angles.size() != 2) {
     throw Error(ExitCode::usage, "expected two angles, got " + std::to_string(angles.size()), option,
                 "write THETA,PHI in degrees");
   }
-  if (!(angles[0] >= 0.0 && angles[0] < 90.0)) {
+  if (sphere && !(angles[0] >= 0.0 && angles[0] <= 180.0)) {
+    throw Error(ExitCode::usage, "theta = " + number_text(angles[0]) + " is out of range", option,
+                "choose an angle from 0 to 180 degrees");
+  }
+  if (!sphere && !(angles[0] >= 0.0 && angles[0] < 90.0)) {
     throw Error(ExitCode::usage, "theta = " + number_text(angles[0]) + " is out of range", option,
                 "choose an angle from 0 to below 90 degrees: directions lie above the surface");
   }
@@ -79,7 +83,9 @@ Json parameters_json(const ParameterValues& values) {
   for (const ParameterInfo& info : values.list()) {
     const std::span<const double> slots = values.components(info);
     Json& member = json[std::string(info.name)];
-    if (!info.choices.empty()) {
+    if (info.file) {
+      member = values.path(info.name);
+    } else if (!info.choices.empty()) {
       member = std::string(values.choice(info.name));
     } else if (info.components == 1) {
       member = slots[0];
@@ -91,14 +97,6 @@ Json parameters_json(const ParameterValues& values) {
 }
 
 namespace {
-
-bool is_grey(const ParameterValues& values) {
-  for (const ParameterInfo& info : values.list()) {
-    const std::span<const double> slots = values.components(info);
-    if (info.components == 3 && (slots[0] != slots[1] || slots[0] != slots[2])) return false;
-  }
-  return true;
-}
 
 /// The row of a table whose parameters are `settings`; a table without axes has one.
 std::size_t find_row(const Table& table, const std::vector<std::string>& settings) {
@@ -140,10 +138,9 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
   if (const Reference* reference = find_reference_or_null(name)) {
     ParameterValues values = reference->defaults();
     set_parameters(values, settings);
-    return {name, is_grey(values) ? 1 : 3,
-            [reference, values](const Direction& wi, const Direction& wo) {
-              return reference->exact(values.flat(), wi, wo);
-            },
+    const std::shared_ptr<const Integrator> integrator = reference->make(values);
+    return {name, integrator->channels(), reference->sphere,
+            [integrator](const Direction& wi, const Direction& wo) { return integrator->exact(wi, wo); },
             parameters_json(values)};
   }
   if (is_file(name)) {
@@ -152,14 +149,14 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
     Json parameters = table->parameters;
     const std::vector<double> coordinates = table->parameter_values(row);
     for (std::size_t i = 0; i < coordinates.size(); ++i) parameters[table->parameter_axes[i].name] = coordinates[i];
-    return {name, table->channels,
-            [table, row](const Direction& wi, const Direction& wo) { return table->interpolate(row, wi, wo); },
-            parameters};
+    return {
+        name, table->channels, table->grid.theta_i.values.back() >= 90.0 || table->grid.theta_o.values.back() >= 90.0,
+        [table, row](const Direction& wi, const Direction& wo) { return table->interpolate(row, wi, wo); }, parameters};
   }
   const Model& model = find_model(name);
   ParameterValues values = model.defaults();
   set_parameters(values, settings);
-  return {name, 3,
+  return {name, 3, false,
           [&model, values](const Direction& wi, const Direction& wo) { return model.evaluate(values.flat(), wi, wo); },
           parameters_json(values)};
 }

@@ -52,8 +52,8 @@ inline CLI::Option* add_repeatable(CLI::App& verb, const std::string& name, std:
 void set_parameters(ParameterValues& values, const std::vector<std::string>& settings);
 /// --axis NAME=v1,v2,…
 std::vector<Axis> parse_axes(const std::vector<std::string>& texts);
-/// THETA,PHI in degrees, theta in [0, 90).
-Direction parse_direction(const std::string& text, const char* option);
+/// THETA,PHI in degrees, theta in [0, 90), or [0, 180] where directions may come from below.
+Direction parse_direction(const std::string& text, const char* option, bool sphere = false);
 /// `3` or three comma-separated components.
 Json rgb_json(const Rgb& value, int channels);
 std::string rgb_text(const Rgb& value, int channels);
@@ -66,6 +66,7 @@ void write_or_print(const std::string& text, const std::string& output, bool for
 struct Source {
   std::string label;
   int channels = 3;
+  bool sphere = false;  // directions may come from below
   std::function<Rgb(const Direction& wi, const Direction& wo)> evaluate;
   Json parameters;
 };

@@ -80,8 +80,8 @@ std::string evaluate_csv(const Source& source, const std::string& name) {
                   place, "give each row all columns");
     }
     const Rgb f = at_line(place, [&] {
-      const Direction wi = parse_direction(cells[columns[0]] + "," + cells[columns[1]], "theta_i,phi_i");
-      const Direction wo = parse_direction(cells[columns[2]] + "," + cells[columns[3]], "theta_o,phi_o");
+      const Direction wi = parse_direction(cells[columns[0]] + "," + cells[columns[1]], "theta_i,phi_i", source.sphere);
+      const Direction wo = parse_direction(cells[columns[2]] + "," + cells[columns[3]], "theta_o,phi_o", source.sphere);
       return source.evaluate(wi, wo);
     });
     result +=
@@ -119,7 +119,8 @@ void add_eval(CLI::App& app, Context& context) {
     }
     Json values = Json::array();
     for (std::size_t i = 0; i < a->wi.size(); ++i) {
-      const Rgb f = source.evaluate(parse_direction(a->wi[i], "--wi"), parse_direction(a->wo[i], "--wo"));
+      const Rgb f = source.evaluate(parse_direction(a->wi[i], "--wi", source.sphere),
+                                    parse_direction(a->wo[i], "--wo", source.sphere));
       values.push_back({{"wi", parse_numbers(a->wi[i], "--wi")},
                         {"wo", parse_numbers(a->wo[i], "--wo")},
                         {"f", rgb_json(f, source.channels)}});

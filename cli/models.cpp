@@ -128,12 +128,9 @@ void add_references(CLI::App& app, Context& context) {
         list.push_back({{"name", reference->name},
                         {"doc", reference->doc},
                         {"source", reference->source},
-                        {"exact", true},
                         {"params", parameters}});
       } else {
-        fmt::print(
-            "{}: {}\n  Source: {}\n  Methods: monte_carlo (visible normals, sobol or philox), exact (quadrature)\n",
-            reference->name, reference->doc, reference->source);
+        fmt::print("{}: {}\n  Source: {}\n", reference->name, reference->doc, reference->source);
         print_parameters(reference->parameters);
       }
     }

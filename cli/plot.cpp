@@ -27,13 +27,14 @@ Table table_of(const PlotArguments& a, const Context& context) {
     }
     return Table::read(a.name);
   }
-  const Grid grid = Grid::named_or_file(a.grid);
   const auto monitor = context.monitor();
   const auto prepared = [&](ParameterValues values) {
     set_parameters(values, a.settings);
     return values;
   };
-  if (const Reference* reference = find_reference_or_null(a.name)) {
+  const Reference* reference = find_reference_or_null(a.name);
+  const Grid grid = Grid::named_or_file(a.grid, reference && reference->sphere);
+  if (reference) {
     return render(*reference, prepared(reference->defaults()), parse_axes(a.axes), grid,
                   {.sampling = {.samples = 1u << 14, .seed = context.seed}}, *monitor);
   }

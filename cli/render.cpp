@@ -19,6 +19,7 @@ void add_render(CLI::App& app, Context& context) {
   struct Arguments {
     std::string name, grid = "default", output, facets = "shared";
     std::vector<std::string> settings, axes;
+    bool orders = false;
     SamplingArguments sampling;
   };
   const auto a = std::make_shared<Arguments>();
@@ -32,16 +33,19 @@ void add_render(CLI::App& app, Context& context) {
                    "independent: every entry its own")
       ->check(CLI::IsMember({"shared", "independent"}))
       ->capture_default_str();
+  verb->add_flag("--orders", a->orders,
+                 "Keep the orders of scattering apart: any albedo follows from the table (table recolor)");
   a->sampling.options.samples = 1u << 14;
   a->sampling.add_to(*verb, "per entry");
   verb->callback([&context, a] {
-    const Grid grid = Grid::named_or_file(a->grid);
     const std::vector<Axis> axes = parse_axes(a->axes);
     const RenderOptions options{.sampling = a->sampling.checked(context.seed),
                                 .exact = a->sampling.exact,
+                                .orders = a->orders,
                                 .shared_facets = a->facets == "shared"};
     const Reference* reference = find_reference_or_null(a->name);
     const Model* model = reference ? nullptr : &find_model(a->name);
+    const Grid grid = Grid::named_or_file(a->grid, reference && reference->sphere);
     ParameterValues values = reference ? reference->defaults() : model->defaults();
     set_parameters(values, a->settings);
     OutputFile file(a->output, context.force);

@@ -85,6 +85,7 @@ void ParameterValues::set(std::string_view name, std::span<const double> compone
   const ParameterInfo& parameter = info(name);
   const std::string where = owner_ + ", parameter " + std::string(name);
   const auto count = static_cast<std::size_t>(parameter.components);
+  if (parameter.file) throw Error(ExitCode::usage, "expected a file, got a number", where, "write NAME=FILE");
   if (components.size() != 1 && components.size() != count) {
     throw Error(ExitCode::usage,
                 "expected " + (count == 1 ? std::string("one number") : "one number or three") + ", got " +
@@ -109,6 +110,10 @@ void ParameterValues::set(std::string_view name, std::span<const double> compone
 void ParameterValues::set_text(std::string_view name, std::string_view text) {
   const ParameterInfo& parameter = info(name);
   const std::string where = owner_ + ", parameter " + std::string(name);
+  if (parameter.file) {
+    paths_[std::string(name)] = text;
+    return;
+  }
   if (parameter.choices.empty()) {
     set(name, parse_numbers(text, where));
     return;
@@ -129,7 +134,13 @@ std::string_view ParameterValues::choice(std::string_view name) const {
   return parameter.choices[static_cast<std::size_t>(flat_[static_cast<std::size_t>(parameter.offset)])];
 }
 
+std::string ParameterValues::path(std::string_view name) const {
+  const auto found = paths_.find(info(name).name);
+  return found == paths_.end() ? "" : found->second;
+}
+
 std::string ParameterValues::text(const ParameterInfo& parameter) const {
+  if (parameter.file) return path(parameter.name);
   const double* values = flat_.data() + parameter.offset;
   if (!parameter.choices.empty()) return std::string(parameter.choices[static_cast<std::size_t>(values[0])]);
   if (parameter.components == 1 || (values[0] == values[1] && values[0] == values[2])) return number_text(values[0]);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -35,7 +36,8 @@ struct ParameterInfo {
   std::string_view doc = "";
   std::span<const std::string_view> choices = {};  // named values 0, 1, …, if not a number
   bool perceptual_roughness = false;               // alpha is its square: tables over alpha set it
-  int components = 1;                              // 3 for RGB; set by the visit
+  bool file = false;                               // a file's path, not a number; takes no slot
+  int components = 1;                              // 3 for RGB, 0 for a file; set by the visit
   int offset = 0;                                  // first slot in the flat array; set by the visit
 };
 
@@ -102,12 +104,15 @@ class ParameterValues {
     return std::span(flat_).subspan(static_cast<std::size_t>(info.offset), static_cast<std::size_t>(info.components));
   }
   std::string_view choice(std::string_view name) const;
+  /// A file's path, "" if none was given.
+  std::string path(std::string_view name) const;
   /// One value as people write it: `0.5`, `0.1,0.2,0.3` or a choice.
   std::string text(const ParameterInfo& info) const;
 
  private:
   std::vector<ParameterInfo> list_;
   std::vector<double> flat_;
+  std::map<std::string, std::string, std::less<>> paths_;
   std::string owner_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "models/scalar.h"
 
@@ -14,15 +15,17 @@ namespace lobefit {
 /// assumption about the points, and leaves 31 degrees of freedom.
 inline constexpr int replicate_count = 32;
 
+struct MeanAndError {
+  double mean = 0.0, standard_error = 0.0;
+};
+
 /// A value with its standard error; `samples` counts all replicates together. method: "monte_carlo" or "exact".
 struct Estimate {
   Rgb f, stderr_f;
+  std::vector<MeanAndError>
+      orders;  // what each order adds per unit of albedo to its power, where orders are kept apart
   std::uint64_t samples = 0;
   std::string_view method;
-};
-
-struct MeanAndError {
-  double mean = 0.0, standard_error = 0.0;
 };
 
 /// Mean of the replicates, and the standard error of that mean.

@@ -3,28 +3,12 @@
 
 #include <span>
 #include <string_view>
-#include <vector>
 
-#include "models/parameter.h"
 #include "reference/estimate.h"
+#include "reference/integrator.h"
 #include "reference/monitor.h"
-#include "reference/sample_points.h"
 
 namespace lobefit {
-
-/// A registered reference: ground truth by integration.
-struct Reference {
-  std::string_view name, doc, source;
-  std::vector<ParameterInfo> parameters;
-  /// BRDF by quadrature.
-  Rgb (*exact)(std::span<const double> flat, const Direction& wi, const Direction& wo);
-  /// Mean BRDFs of one stream of sample points for a line of lights, which share the sampled facets. `fast`: in float,
-  /// vectorised over the lights.
-  void (*sample_row)(std::span<const double> flat, const Direction& wo, std::span<const Direction> wi,
-                     const SamplePoints& points, std::uint32_t samples, bool fast, std::span<Rgb> values);
-
-  ParameterValues defaults() const { return ParameterValues(parameters, std::string(name)); }
-};
 
 std::span<const Reference> references();
 /// Null if there is none of that name.
@@ -47,7 +31,7 @@ struct SamplingOptions {
 inline constexpr std::uint64_t most_samples = std::uint64_t{1} << 30;
 
 /// Monte Carlo estimate at one pair, in double.
-Estimate estimate(const Reference& reference, std::span<const double> flat, const Direction& wi, const Direction& wo,
+Estimate estimate(const Integrator& integrator, const Direction& wi, const Direction& wo,
                   const SamplingOptions& options, Monitor* monitor = nullptr);
 
 }  // namespace lobefit

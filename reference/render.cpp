@@ -6,15 +6,28 @@
 #include <algorithm>
 #include <functional>
 
+#include "reference/json_reader.h"
+#include "reference/output_file.h"
+
 namespace lobefit {
 
 namespace {
 
-/// A table with its axes and provenance, and the flat parameters of each of its rows.
+/// A table with its axes and provenance but without entries, and the parameters of each of its rows.
 struct Canvas {
   Table table;
-  std::vector<std::vector<double>> rows;
+  std::vector<ParameterValues> rows;
 };
+
+/// A surface that does not transmit has no BRDF beyond the horizon.
+void check_hemisphere(const Grid& grid, const std::string& owner) {
+  for (const Axis* axis : {&grid.theta_i, &grid.theta_o}) {
+    if (axis->values.back() >= 90.0) {
+      throw Error(ExitCode::usage, axis->name + " = " + number_text(axis->values.back()) + " is out of range", owner,
+                  "choose angles from 0 to below 90 degrees: directions lie above the surface");
+    }
+  }
+}
 
 Canvas make_canvas(const ParameterValues& values, std::vector<Axis> parameter_axes, const Grid& grid) {
   Canvas canvas;
@@ -25,33 +38,36 @@ Canvas make_canvas(const ParameterValues& values, std::vector<Axis> parameter_ax
   table.version = LOBEFIT_VERSION;
   table.parameters = Json::object();
   for (const Axis& axis : table.parameter_axes) {
-    if (!values.info(axis.name).choices.empty()) {
+    if (!values.info(axis.name).choices.empty() || values.info(axis.name).file) {
       throw Error(ExitCode::usage, "parameter '" + axis.name + "' can't be an axis", values.owner(),
-                  "it is a choice, not a number; render one table per choice with --set");
+                  "it is no number; render one table per choice with --set");
     }
   }
   for (const ParameterInfo& info : values.list()) {
     const bool is_axis = std::any_of(table.parameter_axes.begin(), table.parameter_axes.end(),
                                      [&](const Axis& axis) { return axis.name == info.name; });
     if (is_axis) continue;
-    const std::span<const double> slots =
-        values.flat().subspan(static_cast<std::size_t>(info.offset), static_cast<std::size_t>(info.components));
+    if (info.file) {
+      // What the file held, not where it lay.
+      const std::string path = values.path(info.name);
+      if (!path.empty()) table.parameters[std::string(info.name)] = parse_json(read_file(path), path);
+      continue;
+    }
+    const std::span<const double> slots = values.components(info);
     if (!info.choices.empty()) {
       table.parameters[std::string(info.name)] = std::string(values.choice(info.name));
     } else if (info.components == 1) {
       table.parameters[std::string(info.name)] = slots[0];
     } else {
       table.parameters[std::string(info.name)] = std::vector<double>(slots.begin(), slots.end());
-      if (slots[0] != slots[1] || slots[0] != slots[2]) table.channels = 3;
     }
   }
   for (std::size_t row = 0; row < table.parameter_rows(); ++row) {
     ParameterValues at_row = values;
     const std::vector<double> coordinates = table.parameter_values(row);
     for (std::size_t i = 0; i < coordinates.size(); ++i) at_row.set(table.parameter_axes[i].name, coordinates[i]);
-    canvas.rows.emplace_back(at_row.flat().begin(), at_row.flat().end());
+    canvas.rows.push_back(std::move(at_row));
   }
-  table.allocate();
   return canvas;
 }
 
@@ -79,42 +95,88 @@ void for_each_line(const Table& table, Monitor& monitor, const std::function<voi
   monitor.end();
 }
 
+/// Where the results of one line of a table go: entries [first, first + n).
+class LineWriter {
+ public:
+  LineWriter(Table& table, std::size_t first, std::size_t n)
+      : table_(&table),
+        first_(first),
+        n_(n),
+        orders_(static_cast<std::size_t>(table.orders)),
+        means_(n * replicate_count),
+        order_means_(n * orders_ * replicate_count) {}
+
+  Line replicate(std::size_t r) {
+    return {.values = std::span(means_).subspan(r * n_, n_),
+            .orders = std::span(order_means_).subspan(r * orders_ * n_, orders_ * n_)};
+  }
+
+  void store_exact() {
+    for (std::size_t j = 0; j < n_; ++j) store(*table_, first_ + j, means_[j]);
+    for (std::size_t k = 0; k < orders_ * n_; ++k) {
+      table_->order_values[order_slot(k)] = static_cast<float>(order_means_[k]);
+    }
+  }
+
+  /// Means, errors and replicates of the line; returns the largest standard error of a value.
+  double store_estimates() {
+    double worst = 0.0;
+    std::array<double, replicate_count> column;
+    for (std::size_t j = 0; j < n_; ++j) {
+      Rgb mean;
+      for (int c = 0; c < table_->channels; ++c) {
+        for (std::size_t r = 0; r < replicate_count; ++r) column[r] = channel_of(means_[r * n_ + j], c);
+        const std::size_t slot = static_cast<std::size_t>(c) * table_->entries() + first_ + j;
+        const MeanAndError result = summarise(column, slot, table_->stderr_values, table_->replicates);
+        (c == 0 ? mean.x : c == 1 ? mean.y : mean.z) = result.mean;
+        worst = max(worst, result.standard_error);
+      }
+      store(*table_, first_ + j, mean);
+    }
+    for (std::size_t k = 0; k < orders_ * n_; ++k) {
+      for (std::size_t r = 0; r < replicate_count; ++r) column[r] = order_means_[r * orders_ * n_ + k];
+      const std::size_t slot = order_slot(k);
+      table_->order_values[slot] =
+          static_cast<float>(summarise(column, slot, table_->order_stderr, table_->order_replicates).mean);
+    }
+    return worst;
+  }
+
+ private:
+  std::size_t order_slot(std::size_t k) const { return k / n_ * table_->entries() + first_ + k % n_; }
+
+  static MeanAndError summarise(const std::array<double, replicate_count>& column, std::size_t slot,
+                                std::vector<float>& errors, std::vector<float>& replicates) {
+    const MeanAndError result = mean_and_error(std::span<const double>(column));
+    errors[slot] = static_cast<float>(result.standard_error);
+    for (std::size_t r = 0; r * errors.size() < replicates.size(); ++r) {
+      replicates[r * errors.size() + slot] = static_cast<float>(column[r]);
+    }
+    return result;
+  }
+
+  Table* table_;
+  std::size_t first_, n_, orders_;
+  std::vector<Rgb> means_;           // [replicate][light]
+  std::vector<double> order_means_;  // [replicate][order][light]
+};
+
 /// One line by Monte Carlo: entries [first, first + wi.size()).
-void sample_line(const Reference& reference, std::span<const double> flat, std::span<const Direction> wi,
-                 const Direction& wo, std::size_t first, std::uint64_t key, const RenderOptions& options, Table& table,
-                 Monitor& monitor) {
-  const std::size_t n = wi.size();
-  std::vector<Rgb> means(n * replicate_count);
+void sample_line(const Integrator& integrator, std::span<const Direction> wi, const Direction& wo, std::size_t first,
+                 std::uint64_t key, const RenderOptions& options, Table& table, Monitor& monitor) {
+  LineWriter line(table, first, wi.size());
   for (SamplingOptions sampling = options.sampling;; sampling.samples *= 2) {
     for (std::uint32_t r = 0; r < replicate_count; ++r) {
       monitor.check();
-      reference.sample_row(flat, wo, wi, SamplePoints(sampling.sampler, {sampling.seed, key, r}),
-                           sampling.per_replicate(), options.shared_facets, std::span(means).subspan(r * n, n));
+      integrator.sample_row(wo, wi, SamplePoints(sampling.sampler, {sampling.seed, key, r}), sampling.per_replicate(),
+                            options.shared_facets, line.replicate(r));
     }
-    double worst = 0.0;
-    for (std::size_t j = 0; j < n; ++j) {
-      Rgb mean;
-      for (int c = 0; c < table.channels; ++c) {
-        std::array<double, replicate_count> column;
-        for (std::size_t r = 0; r < replicate_count; ++r) column[r] = channel_of(means[r * n + j], c);
-        const MeanAndError result = mean_and_error(std::span<const double>(column));
-        (c == 0 ? mean.x : c == 1 ? mean.y : mean.z) = result.mean;
-        const std::size_t slot = static_cast<std::size_t>(c) * table.entries() + first + j;
-        table.stderr_values[slot] = static_cast<float>(result.standard_error);
-        if (!table.replicates.empty()) {
-          for (std::size_t r = 0; r < replicate_count; ++r) {
-            table.replicates[r * table.values.size() + slot] = static_cast<float>(column[r]);
-          }
-        }
-        worst = max(worst, result.standard_error);
-      }
-      store(table, first + j, mean);
-    }
+    const double worst = line.store_estimates();
     if (sampling.stderr_target > 0.0 && worst > sampling.stderr_target && sampling.samples * 2 <= most_samples)
       continue;
     if (!table.sample_counts.empty()) {
       const auto count = static_cast<float>(std::uint64_t{sampling.per_replicate()} * replicate_count);
-      std::fill_n(table.sample_counts.begin() + static_cast<std::ptrdiff_t>(first), n, count);
+      std::fill_n(table.sample_counts.begin() + static_cast<std::ptrdiff_t>(first), wi.size(), count);
     }
     return;
   }
@@ -124,29 +186,48 @@ void sample_line(const Reference& reference, std::span<const double> flat, std::
 
 Table render(const Reference& reference, const ParameterValues& values, std::vector<Axis> parameter_axes,
              const Grid& grid, const RenderOptions& options, Monitor& monitor) {
+  if (!reference.sphere) check_hemisphere(grid, std::string(reference.name));
   Canvas canvas = make_canvas(values, std::move(parameter_axes), grid);
+  std::vector<std::unique_ptr<const Integrator>> integrators;
   Table& table = canvas.table;
+  for (const ParameterValues& row : canvas.rows) {
+    integrators.push_back(reference.make(row));
+    table.channels = std::max(table.channels, integrators.back()->channels());
+  }
+  if (options.orders) {
+    table.orders = integrators.front()->orders();
+    if (table.orders == 0) {
+      throw Error(ExitCode::usage, "these parameters have no orders to keep apart", "--orders",
+                  "leave it out, or let light bounce: --set bounces=all");
+    }
+  }
+  table.allocate();
   table.method = options.exact ? "exact" : "monte_carlo";
   if (!options.exact) {
     table.seed = options.sampling.seed;
     table.samples = std::uint64_t{options.sampling.per_replicate()} * replicate_count;
     table.shared_facets = options.shared_facets;
     if (options.sampling.stderr_target > 0.0) table.sample_counts.assign(table.entries(), 0.0f);
-    if (options.shared_facets) table.replicates.assign(table.values.size() * replicate_count, 0.0f);
+    if (options.shared_facets) {
+      table.replicates.assign(table.values.size() * replicate_count, 0.0f);
+      table.order_replicates.assign(table.order_values.size() * replicate_count, 0.0f);
+    }
   }
   for_each_line(table, monitor, [&](std::size_t y) {
     const std::size_t first = y * table.width();
-    const std::vector<double>& flat = canvas.rows[y / table.lines_per_parameter()];
+    const Integrator& integrator = *integrators[y / table.lines_per_parameter()];
     const Direction wo = table.wo(first);
     std::vector<Direction> wi(table.width());
     for (std::size_t x = 0; x < wi.size(); ++x) wi[x] = table.wi(first + x);
     if (options.exact) {
-      for (std::size_t x = 0; x < wi.size(); ++x) store(table, first + x, reference.exact(flat, wi[x], wo));
+      LineWriter line(table, first, wi.size());
+      integrator.exact_row(wo, wi, line.replicate(0));
+      line.store_exact();
     } else if (options.shared_facets) {
-      sample_line(reference, flat, wi, wo, first, y, options, table, monitor);
+      sample_line(integrator, wi, wo, first, y, options, table, monitor);
     } else {
       for (std::size_t x = 0; x < wi.size(); ++x) {
-        sample_line(reference, flat, {&wi[x], 1}, wo, first + x, first + x, options, table, monitor);
+        sample_line(integrator, {&wi[x], 1}, wo, first + x, first + x, options, table, monitor);
       }
     }
   });
@@ -155,11 +236,17 @@ Table render(const Reference& reference, const ParameterValues& values, std::vec
 
 Table render(const Model& model, const ParameterValues& values, std::vector<Axis> parameter_axes, const Grid& grid,
              Monitor& monitor) {
+  check_hemisphere(grid, std::string(model.info->name));
   Canvas canvas = make_canvas(values, std::move(parameter_axes), grid);
   Table& table = canvas.table;
+  for (const ParameterInfo& info : values.list()) {
+    const std::span<const double> slots = values.components(info);
+    if (slots.size() == 3 && (slots[0] != slots[1] || slots[0] != slots[2])) table.channels = 3;
+  }
+  table.allocate();
   table.method = "exact";
   for_each_line(table, monitor, [&](std::size_t y) {
-    const std::vector<double>& flat = canvas.rows[y / table.lines_per_parameter()];
+    const std::span<const double> flat = canvas.rows[y / table.lines_per_parameter()].flat();
     for (std::size_t entry = y * table.width(); entry < (y + 1) * table.width(); ++entry) {
       store(table, entry, model.evaluate(flat, table.wi(entry), table.wo(entry)));
     }

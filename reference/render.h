@@ -13,6 +13,7 @@ namespace lobefit {
 struct RenderOptions {
   SamplingOptions sampling{.samples = 1u << 14};  // per entry
   bool exact = false;
+  bool orders = false;  // keep the orders of scattering apart, where the reference has them
   /// One facet set serves all lights of a line: fast, but their errors are correlated, so replicates are kept.
   /// Otherwise every entry has its own facets.
   bool shared_facets = true;

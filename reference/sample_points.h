@@ -33,23 +33,61 @@ struct StreamKey {
 
 enum class Sampler { sobol, philox };
 
-/// Sample points of one stream in the unit square.
+/// Sample points of one stream: for every index a sequence of pairs of numbers, pair 0, 1, 2, … Sobol: every pair is a
+/// scrambled two-dimensional Sobol set in an order of its own (padding; Kollig, Keller 2002), from pair 16 on Philox.
 class SamplePoints {
  public:
   SamplePoints(Sampler sampler, const StreamKey& key);
 
-  /// Point number `index` < 2^32.
-  std::array<double, 2> operator()(std::uint32_t index) const;
+  /// Point number `index` < 2^32: its pair 0.
+  std::array<double, 2> operator()(std::uint32_t index) const { return pair(index, 0); }
+  /// Pair number `number` < 2^15.
+  std::array<double, 2> pair(std::uint32_t index, std::uint32_t number) const;
 
-  /// Points first, first + 1, …, one array per coordinate: the same numbers, Sobol's ten times as fast.
+  /// Pairs 0 of first, first + 1, …, one array per coordinate: the same numbers, Sobol's ten times as fast.
   void fill(std::uint32_t first, std::span<double> u, std::span<double> v) const;
+  /// Pairs `number` of some indices, in float: the middles of cells 2^-23 wide. Arrays may be longer than `indices`.
+  void fill(std::uint32_t number, std::span<const std::uint32_t> indices, std::span<float> u, std::span<float> v) const;
 
  private:
-  std::array<std::uint32_t, 4> block(std::uint32_t index, std::uint32_t purpose) const;
+  static constexpr std::uint32_t sobol_pairs = 16;
+  struct Scramble {
+    std::uint32_t u, v, order;
+  };
+
+  std::uint32_t shared_word(std::uint32_t number, std::uint32_t purpose) const;
+  std::array<std::uint32_t, 4> block(std::uint32_t index, std::uint32_t number, std::uint32_t purpose) const;
 
   Sampler sampler_;
   StreamKey key_;
-  std::array<std::uint32_t, 2> scramble_;
+  std::array<Scramble, sobol_pairs> scrambles_;
+};
+
+/// The numbers of one path, one after the other.
+class PathNumbers {
+ public:
+  PathNumbers(const SamplePoints& points, std::uint32_t index) : points_(&points), index_(index) {}
+
+  std::array<double, 2> next_pair() {
+    has_spare_ = false;
+    return points_->pair(index_, number_++);
+  }
+  double next() {
+    if (has_spare_) {
+      has_spare_ = false;
+      return spare_;
+    }
+    const std::array<double, 2> pair = next_pair();
+    spare_ = pair[1];
+    has_spare_ = true;
+    return pair[0];
+  }
+
+ private:
+  const SamplePoints* points_;
+  std::uint32_t index_, number_ = 0;
+  double spare_ = 0.0;
+  bool has_spare_ = false;
 };
 
 }  // namespace lobefit

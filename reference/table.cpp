@@ -1,6 +1,7 @@
 #include "reference/table.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "models/error.h"
@@ -42,7 +43,7 @@ std::vector<double> Axis::weights() const {
   return result;
 }
 
-Grid Grid::named_or_file(const std::string& name) {
+Grid Grid::named_or_file(const std::string& name, bool sphere) {
   if (name == "small") return regular(9, 10.0, 10, 20.0);
   if (name == "default") return regular(18, 5.0, 19, 10.0);
   if (name == "fine") return regular(36, 2.5, 37, 5.0);
@@ -51,7 +52,7 @@ Grid Grid::named_or_file(const std::string& name) {
     throw Error(ExitCode::usage, "unknown grid '" + name + "'", "--grid",
                 "choose small, default, fine, or a JSON file {\"theta_i\":[…],\"theta_o\":[…],\"phi\":[…]}");
   }
-  return from_json(parse_json(read_file(name), name), name);
+  return from_json(parse_json(read_file(name), name), name, sphere);
 }
 
 void check_angles(const JsonReader& reader, double upper, bool closed) {
@@ -69,9 +70,11 @@ void check_angles(const JsonReader& reader, double upper, bool closed) {
   }
 }
 
-Grid Grid::from_json(const Json& json, const std::string& place) { return from_json(JsonReader(json, place)); }
+Grid Grid::from_json(const Json& json, const std::string& place, bool sphere) {
+  return from_json(JsonReader(json, place), sphere);
+}
 
-Grid Grid::from_json(const JsonReader& reader) {
+Grid Grid::from_json(const JsonReader& reader, bool sphere) {
   reader.allow({"theta_i", "theta_o", "phi", "midpoints"});
   const bool midpoints = reader.has("midpoints") && reader.at("midpoints").boolean();
   const auto axis = [&](const char* name, double upper, bool closed) {
@@ -79,7 +82,8 @@ Grid Grid::from_json(const JsonReader& reader) {
     check_angles(reader.at(name), upper, closed);
     return result;
   };
-  return {axis("theta_i", 90.0, false), axis("theta_o", 90.0, false), axis("phi", 180.0, true)};
+  const double horizon = sphere ? 180.0 : 90.0;
+  return {axis("theta_i", horizon, sphere), axis("theta_o", horizon, sphere), axis("phi", 360.0, false)};
 }
 
 std::size_t Table::parameter_rows() const {
@@ -95,6 +99,8 @@ void Table::allocate() {
   values.assign(count, 0.0f);
   stderr_values.assign(count, 0.0f);
   valid.assign(entries(), 1);
+  order_values.assign(static_cast<std::size_t>(orders) * entries(), 0.0f);
+  order_stderr.assign(order_values.size(), 0.0f);
 }
 
 Direction Table::wi(std::size_t entry) const {
@@ -167,6 +173,44 @@ Rgb Table::interpolate(std::size_t row, const Direction& light, const Direction&
   return {sum[0], sum[1], sum[2]};
 }
 
+Table Table::with_albedo(const Rgb& albedo) const {
+  if (orders == 0) {
+    throw Error(ExitCode::usage, "the table keeps no orders of scattering", "",
+                "render it with --orders: then any albedo follows from it");
+  }
+  Table result = *this;
+  result.channels = albedo.x == albedo.y && albedo.x == albedo.z ? 1 : 3;
+  result.parameters["albedo"] = {albedo.x, albedo.y, albedo.z};
+  const std::size_t count = entries(), order_count = static_cast<std::size_t>(orders);
+  result.values.assign(static_cast<std::size_t>(result.channels) * count, 0.0f);
+  result.stderr_values.assign(result.values.size(), 0.0f);
+  if (!order_replicates.empty()) result.replicates.assign(result.values.size() * replicate_count, 0.0f);
+  const auto sum_orders = [&](const float* planes, std::size_t entry, double rho) {
+    double sum = 0.0;
+    for (std::size_t n = order_count; n-- > 0;) sum = rho * (sum + planes[n * count + entry]);
+    return sum;
+  };
+  for (std::size_t c = 0; c < static_cast<std::size_t>(result.channels); ++c) {
+    const double rho = c == 0 ? albedo.x : c == 1 ? albedo.y : albedo.z;
+    for (std::size_t entry = 0; entry < count; ++entry) {
+      const std::size_t slot = c * count + entry;
+      result.values[slot] = static_cast<float>(sum_orders(order_values.data(), entry, rho));
+      if (order_replicates.empty()) {
+        // Orders share their paths: their errors may all have one sign, so they add up at worst.
+        result.stderr_values[slot] = static_cast<float>(sum_orders(order_stderr.data(), entry, rho));
+        continue;
+      }
+      std::array<double, replicate_count> column;
+      for (std::size_t r = 0; r < replicate_count; ++r) {
+        column[r] = sum_orders(order_replicates.data() + r * order_count * count, entry, rho);
+        result.replicates[r * result.values.size() + slot] = static_cast<float>(column[r]);
+      }
+      result.stderr_values[slot] = static_cast<float>(mean_and_error(std::span<const double>(column)).standard_error);
+    }
+  }
+  return result;
+}
+
 Table Table::row_slice(std::size_t row) const {
   Table slice = *this;
   const std::vector<double> coordinates = parameter_values(row);
@@ -184,6 +228,9 @@ Table Table::row_slice(std::size_t row) const {
   cut(stderr_values, slice.stderr_values);
   cut(replicates, slice.replicates);
   cut(sample_counts, slice.sample_counts);
+  cut(order_values, slice.order_values);
+  cut(order_stderr, slice.order_stderr);
+  cut(order_replicates, slice.order_replicates);
   cut(valid, slice.valid);
   return slice;
 }
@@ -208,6 +255,7 @@ Json Table::describe() const {
           {"entries", entries()},
           {"masked", masked()},
           {"replicates", replicates.empty() ? 0 : replicate_count},
+          {"orders", orders},
           {"provenance",
            {{"reference", model},
             {"params", parameters},

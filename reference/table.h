@@ -30,15 +30,16 @@ struct Axis {
   std::vector<double> weights() const;
 };
 
-/// Polar angles and azimuth differences in degrees; theta in [0, 90), phi in [0, 180].
+/// Polar angles and azimuth differences in degrees; theta in [0, 90), for what has a BRDF over the whole `sphere` in
+/// [0, 180]; phi in [0, 360).
 struct Grid {
   Axis theta_i, theta_o, phi;
 
   /// "small" (9 × 9 × 10), "default" (18 × 18 × 19), "fine" (36 × 36 × 37), or a JSON file of angles.
-  static Grid named_or_file(const std::string& name);
+  static Grid named_or_file(const std::string& name, bool sphere = false);
   /// From {"theta_i": […], "theta_o": […], "phi": […], "midpoints": false}; `place` names the file in errors.
-  static Grid from_json(const Json& json, const std::string& place);
-  static Grid from_json(const JsonReader& reader);
+  static Grid from_json(const Json& json, const std::string& place, bool sphere = false);
+  static Grid from_json(const JsonReader& reader, bool sphere = false);
 };
 
 struct Table {
@@ -56,7 +57,13 @@ struct Table {
   std::vector<float> stderr_values;
   std::vector<float> replicates;     // [replicate][channel][entry], or empty
   std::vector<float> sample_counts;  // [entry] where sampling was adaptive, or empty
-  std::vector<std::uint8_t> valid;   // [entry]
+  // What order n = 1, 2, … of scattering adds, per unit of albedo to its nth power; the last one holds all further
+  // ones.
+  int orders = 0;
+  std::vector<float> order_values;      // [order][entry]
+  std::vector<float> order_stderr;      // [order][entry]
+  std::vector<float> order_replicates;  // [replicate][order][entry] where replicates are kept
+  std::vector<std::uint8_t> valid;      // [entry]
 
   std::size_t width() const { return grid.phi.size() * grid.theta_i.size(); }
   std::size_t lines_per_parameter() const { return grid.theta_o.size(); }
@@ -79,6 +86,9 @@ struct Table {
                           entries() +
                       entry];
   }
+
+  /// The same surface at another albedo, from its orders; errors included. Throws Error(usage) without orders.
+  Table with_albedo(const Rgb& albedo) const;
 
   std::size_t parameter_row(std::size_t entry) const { return entry / (width() * lines_per_parameter()); }
   std::size_t theta_o_index(std::size_t entry) const { return entry / width() % lines_per_parameter(); }

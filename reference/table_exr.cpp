@@ -45,6 +45,16 @@ std::vector<Plane> planes(Table& table) {
           {"replicate." + std::to_string(r) + "." + name, table.replicates.data() + r * table.values.size() + offset});
     }
   }
+  for (std::size_t n = 0; n < static_cast<std::size_t>(table.orders); ++n) {
+    const std::string name = "order." + std::to_string(n + 1) + ".Y";
+    const std::size_t offset = n * table.entries();
+    result.push_back({name, table.order_values.data() + offset});
+    result.push_back({"stderr." + name, table.order_stderr.data() + offset});
+    for (std::size_t r = 0; r * table.order_values.size() < table.order_replicates.size(); ++r) {
+      result.push_back({"replicate." + std::to_string(r) + "." + name,
+                        table.order_replicates.data() + r * table.order_values.size() + offset});
+    }
+  }
   if (!table.sample_counts.empty()) result.push_back({"samples", table.sample_counts.data()});
   return result;
 }
@@ -144,8 +154,8 @@ Table Table::read(const std::filesystem::path& path) {
       if (!axis.midpoints && reader.at("kind").text() != "points") {
         throw reader.at("kind").error("unknown kind of axis", "write points or midpoints");
       }
-      if (axis.name == "theta_i" || axis.name == "theta_o") check_angles(reader.at("values"), 90.0, false);
-      if (axis.name == "phi") check_angles(reader.at("values"), 180.0, true);
+      if (axis.name == "theta_i" || axis.name == "theta_o") check_angles(reader.at("values"), 180.0, true);
+      if (axis.name == "phi") check_angles(reader.at("values"), 360.0, false);
       if (axis.name == "theta_i")
         table.grid.theta_i = axis;
       else if (axis.name == "theta_o")
@@ -187,9 +197,13 @@ Table Table::read(const std::filesystem::path& path) {
     table.command = attribute("command");
 
     table.channels = header.channels().findChannel("Y") ? 1 : 3;
+    while (header.channels().findChannel("order." + std::to_string(table.orders + 1) + ".Y")) ++table.orders;
     table.allocate();
     if (header.channels().findChannel("replicate.0." + channel_name(table, 0))) {
       table.replicates.assign(table.values.size() * replicate_count, 0.0f);
+    }
+    if (header.channels().findChannel("replicate.0.order.1.Y")) {
+      table.order_replicates.assign(table.order_values.size() * replicate_count, 0.0f);
     }
     if (header.channels().findChannel("samples")) table.sample_counts.assign(table.entries(), 0.0f);
     std::vector<float> mask(table.entries());

@@ -40,12 +40,12 @@ LOBEFIT_TEXT void cosine_and_sine_of_turns(double u, double& cosine, double& sin
 
 /// What all GGX facets of one direction share.
 struct GgxView {
-  double alpha;
+  Alpha alpha;
   Direction stretched, t1, t2;
 };
 
-GgxView make_ggx_view(double alpha, const Direction& w) {
-  const Direction stretched = normalize(Direction{alpha * w.x, alpha * w.y, w.z});
+GgxView make_ggx_view(Alpha alpha, const Direction& w) {
+  const Direction stretched = normalize(Direction{alpha.x * w.x, alpha.y * w.y, w.z});
   const double across = std::hypot(stretched.x, stretched.y);
   const Direction t1 =
       across > 0.0 ? Direction{-stretched.y / across, stretched.x / across, 0.0} : Direction{1.0, 0.0, 0.0};
@@ -61,7 +61,7 @@ LOBEFIT_TEXT Direction sample_ggx(const GgxView& view, double u, double v) {
   const double s = 0.5 * (1.0 + view.stretched.z);
   const double p2 = (1.0 - s) * sqrt(1.0 - p1 * p1) + s * radius * sine;
   const Direction m = view.t1 * p1 + view.t2 * p2 + view.stretched * sqrt(1.0 - p1 * p1 - p2 * p2);
-  return normalize(Direction{view.alpha * m.x, view.alpha * m.y, max(m.z, 0.0)});
+  return normalize(Direction{view.alpha.x * m.x, view.alpha.y * m.y, max(m.z, 0.0)});
 }
 
 LOBEFIT_CLONES [[gnu::noinline]] void fill_ggx(const GgxView& view, std::size_t n, const double* __restrict u,
@@ -80,44 +80,45 @@ double sample_visible_beckmann_slope(double cosine, double sine, double u) {
     return 0.5 * (cosine * std::sqrt(pi) * std::erfc(-x) + sine * std::exp(-x * x));
   };
   // Beyond |x| = 7 the density is below 1e-21.
-  double low = -7.0, high = sine > 0.0 ? std::min(7.0, cosine / sine) : 7.0;
+  const double high = sine > 0.0 ? std::min(7.0, cosine / sine) : 7.0;
+  double low = std::min(-7.0, high - 1.0), upper = high;
   const double target = u * cumulative(high);
   double x = std::min(high, boost::math::erf_inv(2.0 * u - 1.0));
   // Newton from the unseen slope's quantile, kept inside a shrinking bracket.
-  for (int iteration = 0; iteration < 60 && high - low > 1e-15; ++iteration) {
+  for (int iteration = 0; iteration < 60 && upper - low > 1e-15; ++iteration) {
     const double excess = cumulative(x) - target;
-    (excess > 0.0 ? high : low) = x;
+    (excess > 0.0 ? upper : low) = x;
     const double step = excess / ((cosine - x * sine) * std::exp(-x * x));
     const double next = x - step;
     // Newton's error after a step this small is below rounding.
     if (std::abs(step) < 1e-10) return next;
     // NaN and overshoots fall back to bisection.
-    x = next > low && next < high ? next : 0.5 * (low + high);
+    x = next > low && next < upper ? next : 0.5 * (low + upper);
   }
   return x;
 }
 
-Direction sample_beckmann(double alpha, const Direction& w, const std::array<double, 2>& u) {
-  const Direction stretched = normalize(Direction{alpha * w.x, alpha * w.y, w.z});
+Direction sample_beckmann(Alpha alpha, const Direction& w, const std::array<double, 2>& u) {
+  const Direction stretched = normalize(Direction{alpha.x * w.x, alpha.y * w.y, w.z});
   const double sine = std::hypot(stretched.x, stretched.y);
   const double along = sample_visible_beckmann_slope(stretched.z, sine, u[0]);
   const double across = boost::math::erf_inv(2.0 * u[1] - 1.0);
   const double c = sine > 0.0 ? stretched.x / sine : 1.0;
   const double s = sine > 0.0 ? stretched.y / sine : 0.0;
-  const double slope_x = alpha * (c * along - s * across);
-  const double slope_y = alpha * (s * along + c * across);
+  const double slope_x = alpha.x * (c * along - s * across);
+  const double slope_y = alpha.y * (s * along + c * across);
   return normalize(Direction{-slope_x, -slope_y, 1.0});
 }
 
 }  // namespace
 
-Direction sample_visible_normal(Distribution distribution, double alpha, const Direction& w,
+Direction sample_visible_normal(Distribution distribution, Alpha alpha, const Direction& w,
                                 const std::array<double, 2>& u) {
   return distribution == Distribution::ggx ? sample_ggx(make_ggx_view(alpha, w), u[0], u[1])
                                            : sample_beckmann(alpha, w, u);
 }
 
-void sample_visible_normals(Distribution distribution, double alpha, const Direction& w, std::span<const double> u,
+void sample_visible_normals(Distribution distribution, Alpha alpha, const Direction& w, std::span<const double> u,
                             std::span<const double> v, const FacetBatch& facets) {
   if (distribution == Distribution::ggx) {
     return fill_ggx(make_ggx_view(alpha, w), u.size(), u.data(), v.data(), facets.x.data(), facets.y.data(),

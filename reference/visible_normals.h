@@ -9,12 +9,13 @@
 
 namespace lobefit {
 
-/// A facet normal m with density D(m) (w·m)⁺ G1(w) / (w·n), w unit and above the surface.
+/// A facet normal m with density D(m) (w·m)⁺ G1(w) / (w·n), w unit. A w below the
+/// horizon sees facets too, those that lean towards it; there D (w·m)⁺ is normalised by its own integral.
 ///
 /// GGX: a disk is mapped to the visible half of the stretched hemisphere (Heitz 2018, Sampling the GGX Distribution of
 /// Visible Normals); smooth in u. Beckmann: the visible slope along w by inversion of its distribution function, the
 /// slope across by the inverse error function (Heitz, d'Eon 2014, section 5 of the supplement).
-Direction sample_visible_normal(Distribution distribution, double alpha, const Direction& w,
+Direction sample_visible_normal(Distribution distribution, Alpha alpha, const Direction& w,
                                 const std::array<double, 2>& u);
 
 /// Facets in float, one array per component.
@@ -23,7 +24,7 @@ struct FacetBatch {
 };
 
 /// The same for many points, rounded to float; vectorised for GGX.
-void sample_visible_normals(Distribution distribution, double alpha, const Direction& w, std::span<const double> u,
+void sample_visible_normals(Distribution distribution, Alpha alpha, const Direction& w, std::span<const double> u,
                             std::span<const double> v, const FacetBatch& facets);
 
 }  // namespace lobefit

@@ -15,7 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "reference/microfacet_diffuse.h"
+#include "reference/diffuse/facet_quadrature.h"
+#include "reference/diffuse/microfacet_diffuse.h"
 #include "reference/references.h"
 #include "reference/visible_normals.h"
 #include "tests/directions.h"
@@ -39,7 +40,7 @@ ParameterValues surface(double alpha, std::string_view masking = "correlated",
 }
 
 double exact(const ParameterValues& values, const Direction& wi, const Direction& wo) {
-  return microfacet_diffuse().exact(values.flat(), wi, wo).x;
+  return microfacet_diffuse().make(values)->exact(wi, wo).x;
 }
 
 Direction from_degrees(double theta, double phi) { return direction(radians(theta), radians(phi)); }
@@ -385,11 +386,11 @@ TEST(MicrofacetDiffuse, AlbedoScalesEachChannel) {
   const Direction wi = from_degrees(30.0, 80.0), wo = from_degrees(55.0, 0.0);
   const double white = exact(values, wi, wo);
   values.set("albedo", std::array{0.1, 0.5, 0.9});
-  const Rgb f = microfacet_diffuse().exact(values.flat(), wi, wo);
+  const Rgb f = microfacet_diffuse().make(values)->exact(wi, wo);
   EXPECT_DOUBLE_EQ(f.x, 0.1 * white);
   EXPECT_DOUBLE_EQ(f.y, 0.5 * white);
   EXPECT_DOUBLE_EQ(f.z, 0.9 * white);
-  const Estimate sampled = estimate(microfacet_diffuse(), values.flat(), wi, wo, {.samples = 4096});
+  const Estimate sampled = estimate(*microfacet_diffuse().make(values), wi, wo, {.samples = 4096});
   EXPECT_NEAR(sampled.f.x / sampled.f.z, 0.1 / 0.9, 1e-12);
   EXPECT_NEAR(sampled.stderr_f.y / sampled.stderr_f.z, 0.5 / 0.9, 1e-12);
 }
@@ -544,7 +545,7 @@ TEST(MonteCarlo, IsWithinFourStandardErrors) {
     double worst = 0.0;
     std::uint64_t seed = 0;
     for (const Configuration& c : random_configurations(100)) {
-      const Estimate result = estimate(microfacet_diffuse(), c.values.flat(), c.wi, c.wo,
+      const Estimate result = estimate(*microfacet_diffuse().make(c.values), c.wi, c.wo,
                                        {.samples = 1u << 13, .sampler = sampler, .seed = ++seed});
       const double error = (result.f.x - exact(c.values, c.wi, c.wo)) / result.stderr_f.x;
       worst = std::max(worst, std::abs(error));
@@ -566,7 +567,7 @@ TEST(MonteCarlo, StandardErrorsAreHonest) {
     for (const Configuration& c : configurations) {
       const double truth = exact(c.values, c.wi, c.wo);
       for (int repetition = 0; repetition < seeds; ++repetition) {
-        const Estimate result = estimate(microfacet_diffuse(), c.values.flat(), c.wi, c.wo,
+        const Estimate result = estimate(*microfacet_diffuse().make(c.values), c.wi, c.wo,
                                          {.samples = 2048, .sampler = sampler, .seed = ++seed});
         const double p = boost::math::cdf(student, (result.f.x - truth) / result.stderr_f.x);
         const double z = boost::math::quantile(boost::math::normal(), p);
@@ -600,8 +601,9 @@ TEST(MonteCarlo, FastRowsMeetThoseInDouble) {
     const Direction wo = random_pairs(1, 43 + static_cast<std::uint64_t>(trial))[0].wo;
     const SamplePoints points(Sampler::sobol, {1, static_cast<std::uint64_t>(trial), 0});
     std::vector<Rgb> fast(wi.size()), slow(wi.size());
-    microfacet_diffuse().sample_row(values.flat(), wo, wi, points, 1000, true, fast);
-    microfacet_diffuse().sample_row(values.flat(), wo, wi, points, 1000, false, slow);
+    const std::unique_ptr<const Integrator> integrator = microfacet_diffuse().make(values);
+    integrator->sample_row(wo, wi, points, 1000, true, {.values = fast});
+    integrator->sample_row(wo, wi, points, 1000, false, {.values = slow});
     for (std::size_t j = 0; j < wi.size(); ++j) {
       ASSERT_GT(slow[j].x, 0.0);
       const double error = std::abs(fast[j].x / slow[j].x - 1.0);
@@ -618,17 +620,17 @@ TEST(MonteCarlo, StopsAtTheTargetedError) {
   for (const Sampler sampler : {Sampler::sobol, Sampler::philox}) {
     for (const double target : {1e-3, 1e-4}) {
       const SamplingOptions options{.samples = 512, .stderr_target = target, .sampler = sampler};
-      const Estimate result = estimate(microfacet_diffuse(), values.flat(), wi, wo, options);
+      const Estimate result = estimate(*microfacet_diffuse().make(values), wi, wo, options);
       EXPECT_LE(result.stderr_f.x, target);
       EXPECT_EQ(result.samples % 512, 0u);
       // No sooner and no later: that many samples give that very estimate, half as many an error above the target.
       const Estimate same =
-          estimate(microfacet_diffuse(), values.flat(), wi, wo, {.samples = result.samples, .sampler = sampler});
+          estimate(*microfacet_diffuse().make(values), wi, wo, {.samples = result.samples, .sampler = sampler});
       EXPECT_EQ(same.f.x, result.f.x);
       EXPECT_EQ(same.stderr_f.x, result.stderr_f.x);
       ASSERT_GT(result.samples, 512u);
       const Estimate half =
-          estimate(microfacet_diffuse(), values.flat(), wi, wo, {.samples = result.samples / 2, .sampler = sampler});
+          estimate(*microfacet_diffuse().make(values), wi, wo, {.samples = result.samples / 2, .sampler = sampler});
       EXPECT_GT(half.stderr_f.x, target);
     }
   }
@@ -637,8 +639,8 @@ TEST(MonteCarlo, StopsAtTheTargetedError) {
 TEST(MonteCarlo, SamplesAreRoundedUpToWholeReplicates) {
   const ParameterValues values = surface(0.5);
   const Direction w = from_degrees(20.0, 0.0);
-  EXPECT_EQ(estimate(microfacet_diffuse(), values.flat(), w, w, {.samples = 1}).samples, 32u);
-  EXPECT_EQ(estimate(microfacet_diffuse(), values.flat(), w, w, {.samples = 33}).samples, 64u);
+  EXPECT_EQ(estimate(*microfacet_diffuse().make(values), w, w, {.samples = 1}).samples, 32u);
+  EXPECT_EQ(estimate(*microfacet_diffuse().make(values), w, w, {.samples = 33}).samples, 64u);
 }
 
 TEST(References, AreFoundByName) {

@@ -188,7 +188,7 @@ TEST(Grid, ComplaintsNameTheirPlace) {
   for (const Case& c : {
            Case{R"({"theta_i":[0,90],"theta_o":[0],"phi":[0]})", "g.json, $.theta_i"},
            {R"({"theta_i":[0],"theta_o":[-1,5],"phi":[0]})", "g.json, $.theta_o"},
-           {R"({"theta_i":[0],"theta_o":[0],"phi":[0,180.5]})", "g.json, $.phi"},
+           {R"({"theta_i":[0],"theta_o":[0],"phi":[0,360]})", "g.json, $.phi"},
            {R"({"theta_i":[0,20,10],"theta_o":[0],"phi":[0]})", "g.json, $.theta_i): sort"},
            {R"({"theta_i":[0,20,20],"theta_o":[0],"phi":[0]})", "g.json, $.theta_i): sort"},
            {R"({"theta_i":[],"theta_o":[0],"phi":[0]})", "g.json, $.theta_i"},
@@ -398,12 +398,21 @@ TEST(Table, SeedsAndSamplersMakeDifferentTables) {
   EXPECT_NE(first, values({.samples = 320, .sampler = Sampler::philox, .seed = 1}));
 }
 
+TEST(Table, SurfacesHaveNoDirectionsBeyondTheHorizon) {
+  Monitor silent;
+  Grid grid = small_grid();
+  grid.theta_o.values.back() = 90.0;
+  expect_error(ExitCode::usage, "theta_o = 90 is out of range", [&] {
+    render(find_reference("microfacet_diffuse"), microfacet_diffuse(), {}, grid, {.sampling = {.samples = 64}}, silent);
+  });
+}
+
 TEST(Table, ExactRendersHoldTheReferencesValues) {
   const Table table = monte_carlo(microfacet_diffuse(), {.exact = true});
   const Reference& reference = find_reference("microfacet_diffuse");
   for (const std::size_t entry : {std::size_t{0}, std::size_t{17}, std::size_t{40}, table.entries() - 1}) {
     const ParameterValues values = microfacet_diffuse(table.parameter_values(table.parameter_row(entry))[0]);
-    const Rgb f = reference.exact(values.flat(), table.wi(entry), table.wo(entry));
+    const Rgb f = reference.make(values)->exact(table.wi(entry), table.wo(entry));
     EXPECT_EQ(table.value(entry), static_cast<float>(f.x));
     EXPECT_EQ(table.standard_error(entry), 0.0f);
   }
@@ -727,7 +736,7 @@ TEST_F(TableFiles, BrokenAttributesAreRefused) {
                                                         {"axes", axes("[1e999]")},
                                                         {"axes", axes("[\"0\"]")},
                                                         {"axes", axes("0")},
-                                                        {"axes", axes("[90]")},
+                                                        {"axes", axes("[181]")},
                                                         {"axes", axes("[-1]")},
                                                         {"axes", axes("[123456]")},
                                                         {"axes", axes("[0]", "wavelets")},

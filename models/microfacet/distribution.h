@@ -1,4 +1,4 @@
-// Isotropic microfacet distributions, by the slopes of their facets.
+// Microfacet distributions, by the slopes of their facets.
 //
 // A facet normal m has slope t = tan theta_m, relative slope tau = t/alpha. The slope density P22 is normalised:
 // ∫ P22 t dt dφ = ∫ D cos theta_m dm = 1. Lambda is Smith's: G1 = 1/(1 + Lambda) (Walter et al. 2007; Heitz 2014).
@@ -16,23 +16,30 @@ inline double relative_slope_density(Distribution distribution, double tau) {
   return distribution == Distribution::ggx ? 1.0 / (pi * (1.0 + tau2) * (1.0 + tau2)) : std::exp(-tau2) / pi;
 }
 
+/// Roughness along x and y; isotropic where they are one number.
+struct Alpha {
+  double x, y;
+
+  Alpha(double both) : x(both), y(both) {}
+  Alpha(double along_x, double along_y) : x(along_x), y(along_y) {}
+};
+
 /// Density D of facet normals per solid angle of m and unit of macro-surface area.
-inline double facet_density(Distribution distribution, double alpha, const Direction& m) {
+inline double facet_density(Distribution distribution, Alpha alpha, const Direction& m) {
   const double cos2 = m.z * m.z;
-  const double tau = std::sqrt(m.x * m.x + m.y * m.y) / (alpha * m.z);
-  return relative_slope_density(distribution, tau) / (alpha * alpha * cos2 * cos2);
+  const double tau = std::hypot(m.x / alpha.x, m.y / alpha.y) / m.z;
+  return relative_slope_density(distribution, tau) / (alpha.x * alpha.y * cos2 * cos2);
 }
 
 /// Smith's Lambda of a direction above the surface.
-inline double smith_lambda(Distribution distribution, double alpha, const Direction& w) {
-  const double sine = std::sqrt(w.x * w.x + w.y * w.y);
+inline double smith_lambda(Distribution distribution, Alpha alpha, const Direction& w) {
+  const double stretched = std::sqrt(alpha.x * w.x * alpha.x * w.x + alpha.y * w.y * alpha.y * w.y);
   if (distribution == Distribution::ggx) {
     // (-1 + √(1 + α² tan²))/2 = α² sin² / (2 cos (cos + √(cos² + α² sin²))): no cancellation at normal incidence.
-    const double stretched = alpha * sine;
     return stretched * stretched / (2.0 * w.z * (w.z + std::sqrt(w.z * w.z + stretched * stretched)));
   }
-  if (sine == 0.0) return 0.0;
-  const double a = w.z / (alpha * sine);
+  if (stretched == 0.0) return 0.0;
+  const double a = w.z / stretched;
   return 0.5 * (std::exp(-a * a) / (a * std::sqrt(pi)) - std::erfc(a));
 }
 
