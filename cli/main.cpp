@@ -97,6 +97,7 @@ int run(int argc, char** argv) {
   add_check(app, context);
   add_export(app, context);
   add_plot(app, context);
+  add_study(app, context);
   for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) {
     verb->fallthrough();
     // One line in the list of verbs; the rest, examples and remarks, where the verb's own help ends.

@@ -13,7 +13,7 @@ void Integrator::exact_row(const Direction&, std::span<const Direction>, const L
 }
 
 std::span<const Reference> references() {
-  static const std::array all{microfacet_diffuse_reference()};
+  static const std::array all{microfacet_diffuse_reference(), hair_reference()};
   return all;
 }
 

@@ -138,16 +138,11 @@ void MicrofacetDiffuseSurface::exact_row(const Direction& wo, std::span<const Di
                 "leave it out: Monte Carlo gives the value with its error");
   }
   const std::size_t n = wi.size();
-  OrderSums sums(n, 0.0);
   const Direction view = to_surface(wo);
-  for (std::size_t j = 0; j < n; ++j) {
-    const Direction light = to_surface(wi[j]);
-    sums[j] = exact_first_order(light, view);
-    if (bounces_ == 1) continue;
-    const std::vector<double> further = smith_orders().evaluate(light, view);
-    sums.resize(further.size() * n, 0.0);
-    for (std::size_t k = 1; k < further.size(); ++k) sums[k * n + j] = further[k];
-  }
+  std::vector<Direction> lights(n);
+  for (std::size_t j = 0; j < n; ++j) lights[j] = to_surface(wi[j]);
+  OrderSums sums = bounces_ == 1 ? OrderSums(n) : smith_orders().evaluate(lights, view);
+  for (std::size_t j = 0; j < n; ++j) sums[j] = exact_first_order(lights[j], view);
   finish(sums, n, line);
 }
 

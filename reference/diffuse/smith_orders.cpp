@@ -210,24 +210,42 @@ std::shared_ptr<const SmithOrders::Row> SmithOrders::row(double mu) const {
   return rows_.emplace(mu, result).first->second;
 }
 
-std::vector<double> SmithOrders::evaluate(const Direction& wi, const Direction& wo) const {
-  const std::shared_ptr<const Row> a = row(wo.z), b = row(wi.z);
-  const double sine_product = std::hypot(wi.x, wi.y) * std::hypot(wo.x, wo.y);
-  const double cosine = sine_product > 0.0 ? std::clamp((wi.x * wo.x + wi.y * wo.y) / sine_product, -1.0, 1.0) : 1.0;
-  const double phi = std::acos(cosine);
+SmithOrders::Matrix SmithOrders::azimuthal_modes(double mu_a, double mu_b) const {
+  const std::shared_ptr<const Row> a = row(mu_a), b = row(mu_b);
   const double scaling = scale(a->mu, a->lambda, b->mu, b->lambda);
-  std::vector<double> result(static_cast<std::size_t>(orders_), 0.0);
+  Matrix result = Matrix::Zero(static_cast<Eigen::Index>(modes_.size()), orders_ + 1);
   for (std::size_t m = 0; m < modes_.size(); ++m) {
-    const double wave = (m == 0 ? 1.0 : 2.0) * std::cos(static_cast<double>(m) * phi) * scaling;
-    const Vector from_light = b->f[m].transpose() * a->down_up[m], from_view = a->f[m].transpose() * b->down_up[m];
+    const Vector from_b = b->f[m].transpose() * a->down_up[m], from_a = a->f[m].transpose() * b->down_up[m];
     const Matrix twice = a->f[m].transpose() * b->back[m];
     for (Eigen::Index order = 2; order <= orders_; ++order) {
-      double sum = b->mu * from_light(order - 1) + a->mu * from_view(order - 1);
+      double sum = b->mu * from_b(order - 1) + a->mu * from_a(order - 1);
       for (Eigen::Index k = 1; k + 1 < order; ++k) sum += a->mu * b->mu * twice(k, order - 1 - k);
-      result[static_cast<std::size_t>(order) - 1] += wave * sum;
+      result(static_cast<Eigen::Index>(m), order) = (m == 0 ? 1.0 : 2.0) * scaling * sum;
     }
   }
   return result;
+}
+
+std::vector<double> SmithOrders::evaluate(std::span<const Direction> wi, const Direction& wo) const {
+  std::vector<double> result(static_cast<std::size_t>(orders_) * wi.size(), 0.0);
+  Matrix modes;
+  for (std::size_t j = 0; j < wi.size(); ++j) {
+    if (j == 0 || wi[j].z != wi[j - 1].z) modes = azimuthal_modes(wo.z, wi[j].z);
+    const double sine_product = std::hypot(wi[j].x, wi[j].y) * std::hypot(wo.x, wo.y);
+    const double cosine =
+        sine_product > 0.0 ? std::clamp((wi[j].x * wo.x + wi[j].y * wo.y) / sine_product, -1.0, 1.0) : 1.0;
+    Vector waves(modes.rows());
+    for (Eigen::Index m = 0; m < waves.size(); ++m) waves(m) = std::cos(static_cast<double>(m) * std::acos(cosine));
+    const Vector orders = modes.transpose() * waves;
+    for (std::size_t n = 1; n < static_cast<std::size_t>(orders_); ++n) {
+      result[n * wi.size() + j] = orders(static_cast<Eigen::Index>(n) + 1);
+    }
+  }
+  return result;
+}
+
+std::vector<double> SmithOrders::evaluate(const Direction& wi, const Direction& wo) const {
+  return evaluate({&wi, 1}, wo);
 }
 
 std::vector<double> SmithOrders::albedo(double mu) const {

@@ -17,6 +17,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "models/geometry.h"
@@ -38,9 +39,11 @@ class SmithOrders {
 
   /// Highest order that was solved for.
   int orders() const { return orders_; }
-  /// f_n per unit albedo^n for n = 1, …, orders(); order 1 as the modes see it, which is less exact than its own
-  /// quadrature (shared_visibility).
+  /// f_n per unit albedo^n for n = 1, …, orders(); order 1 is left at 0, its own quadrature is more exact
+  /// (shared_visibility).
   std::vector<double> evaluate(const Direction& wi, const Direction& wo) const;
+  /// The same for a line of lights: [order][light]. Lights of one polar angle share nearly all of the work.
+  std::vector<double> evaluate(std::span<const Direction> wi, const Direction& wo) const;
   /// Directional albedo of every order for light from polar cosine `mu`.
   std::vector<double> albedo(double mu) const;
 
@@ -68,6 +71,8 @@ class SmithOrders {
 
   double scale(double mu_a, double lambda_a, double mu_b, double lambda_b) const;
   std::shared_ptr<const Row> row(double mu) const;
+  /// Fourier modes of f_n, n = 2, 3, …, between two polar cosines: mode × order.
+  Matrix azimuthal_modes(double mu_a, double mu_b) const;
   SlopeRule slope_rule(double extra_knot) const;
   /// [mode] modes of (a·m)⁺ for a of polar cosine `mu` at the slopes of `rule`, as columns of slopes.
   Matrix visible_modes(double mu, const SlopeRule& rule) const;
