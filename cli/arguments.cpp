@@ -141,7 +141,7 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
     const std::shared_ptr<const Integrator> integrator = reference->make(values);
     return {name, integrator->channels(), reference->sphere,
             [integrator](const Direction& wi, const Direction& wo) { return integrator->exact(wi, wo); },
-            parameters_json(values)};
+            parameters_json(values), integrator, reference->fibre};
   }
   if (is_file(name)) {
     const auto table = std::make_shared<Table>(Table::read(name));

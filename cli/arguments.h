@@ -70,6 +70,8 @@ struct Source {
   bool sphere = false;  // directions may come from below
   std::function<Rgb(const Direction& wi, const Direction& wo)> evaluate;
   Json parameters;
+  std::shared_ptr<const Integrator> integrator = nullptr;  // of a reference
+  bool fibre = false;                                      // z is its axis
 };
 Source find_source(const std::string& name, const std::vector<std::string>& settings);
 /// Parameters as JSON: numbers, lists, choices by name.

@@ -136,10 +136,14 @@ void add_albedo(CLI::App& app, Context& context) {
   CLI::App* verb =
       app.add_subcommand("albedo",
                          "Directional albedo: the integral of f times cosine over the other direction, by quadrature\n"
+                         "(error: difference of the last two refinements) or, of references that have none, by Monte\n"
+                         "Carlo (standard error). Over both sides where light passes; of a fibre without cosine.\n"
                          "  lobefit albedo eon --set roughness=1 --theta 0,45,80");
   struct Arguments {
     std::string name, theta, fixed = "view";
     std::vector<std::string> settings;
+    SamplingOptions options;
+    CLI::Option* samples = nullptr;
   };
   const auto a = std::make_shared<Arguments>();
   verb->add_option("NAME", a->name, "Model, reference or table file")->required();
@@ -148,14 +152,33 @@ void add_albedo(CLI::App& app, Context& context) {
   verb->add_option("--fixed", a->fixed, "Which direction is fixed (they differ for models that are not reciprocal)")
       ->check(CLI::IsMember({"view", "light"}))
       ->capture_default_str();
+  a->samples = verb->add_option("--samples", a->options.samples, "By Monte Carlo with so many samples (references)")
+                   ->check(CLI::Range(std::uint64_t{replicate_count}, most_samples));
   verb->callback([&context, a] {
     const Source source = find_source(a->name, a->settings);
     Json albedo = Json::array(), error = Json::array();
     const std::vector<double> angles = parse_numbers(a->theta, "--theta");
-    for (const double theta : angles) parse_direction(number_text(theta) + ",0", "--theta");
+    for (const double theta : angles) parse_direction(number_text(theta) + ",0", "--theta", source.sphere);
+    const AlbedoDomain domain = source.fibre    ? AlbedoDomain::fibre
+                                : source.sphere ? AlbedoDomain::sphere
+                                                : AlbedoDomain::hemisphere;
+    const FixedDirection fixed = a->fixed == "view" ? FixedDirection::view : FixedDirection::light;
+    const bool random = a->samples->count() > 0 || (source.integrator && !source.integrator->has_exact());
+    if (random && !source.integrator) {
+      throw Error(ExitCode::usage, "only references are sampled", "--samples", "leave it out: quadrature is used");
+    }
+    const auto monitor = context.monitor();
     for (const double theta : angles) {
-      const Albedo result = directional_albedo(source.evaluate, radians(theta),
-                                               a->fixed == "view" ? FixedDirection::view : FixedDirection::light);
+      Albedo result;
+      if (random) {
+        SamplingOptions options = a->options;
+        options.seed = context.seed;
+        const Estimate estimated =
+            estimate_albedo(*source.integrator, radians(theta), fixed, domain, options, monitor.get());
+        result = {estimated.f, estimated.stderr_f};
+      } else {
+        result = directional_albedo(source.evaluate, radians(theta), fixed, domain);
+      }
       albedo.push_back(rgb_json(result.value, source.channels));
       error.push_back(rgb_json(result.error, source.channels));
       if (!context.json) {

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "models/geometry.h"
+#include "reference/references.h"
 
 namespace lobefit {
 
@@ -13,10 +14,22 @@ struct Albedo {
 
 enum class FixedDirection { view, light };
 
+/// What light is counted by, and over which directions.
+enum class AlbedoDomain {
+  hemisphere,  // cosine above the surface
+  sphere,      // |cosine| on both sides of it
+  fibre,       // all around, without cosine: f of a fibre carries its own
+};
+
 /// ∫ f cosine dω over the direction that is not fixed, the fixed one at `theta` radians. Gauss-Legendre panels in
 /// the polar angle × midpoints in azimuth, both doubled until two refinements agree to `tolerance` (relative) or 256
 /// panels are reached.
 Albedo directional_albedo(const std::function<Rgb(const Direction& wi, const Direction& wo)>& brdf, double theta,
-                          FixedDirection fixed, double tolerance = 1e-6);
+                          FixedDirection fixed, AlbedoDomain domain = AlbedoDomain::hemisphere,
+                          double tolerance = 1e-6);
+
+/// The same by Monte Carlo, for any reference.
+Estimate estimate_albedo(const Integrator& integrator, double theta, FixedDirection fixed, AlbedoDomain domain,
+                         const SamplingOptions& options, Monitor* monitor = nullptr);
 
 }  // namespace lobefit

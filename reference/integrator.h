@@ -27,7 +27,9 @@ class Integrator {
   virtual int channels() const { return 1; }
   /// Orders of scattering that can be kept apart; 0: none.
   virtual int orders() const { return 0; }
-  /// BRDFs by deterministic means; the base class throws Error(usage): there are none.
+  /// Whether exact_row() has an answer.
+  virtual bool has_exact() const { return false; }
+  /// BRDFs by deterministic means; throws Error(usage) where there are none.
   virtual void exact_row(const Direction& wo, std::span<const Direction> wi, const Line& line) const;
   /// Means over `samples` numbers of one stream of the BRDFs of a line of lights, which may share what is sampled.
   /// `fast`: in float, vectorised over the lights, where the reference has that.
@@ -46,6 +48,7 @@ struct Reference {
   std::string_view name, doc, source;
   std::vector<ParameterInfo> parameters;
   bool sphere = false;  // light and view may come from below the surface too
+  bool fibre = false;   // z is a fibre's axis, f carries its own cosine
   /// Throws Error(usage) for parameters that do not go together, Error(invalid_input) for what is wrong in a document.
   std::unique_ptr<const Integrator> (*make)(const ParameterValues& values);
 

@@ -8,8 +8,8 @@
 namespace lobefit {
 
 void Integrator::exact_row(const Direction&, std::span<const Direction>, const Line&) const {
-  throw Error(ExitCode::usage, "no deterministic method for this reference", "--exact",
-              "leave it out: Monte Carlo gives the value with its error");
+  throw Error(ExitCode::usage, "these parameters of the reference have no deterministic method", "",
+              "let Monte Carlo give the value with its error: `lobefit reference` or `render` without --exact");
 }
 
 std::span<const Reference> references() {

@@ -111,7 +111,7 @@ double MicrofacetDiffuseSurface::weight(const Direction& wi, const Direction& wo
     case Masking::view_only: break;
     case Masking::area_mean: break;
   }
-  return g2_over_g1 / (pi * wi.z);
+  return g2_over_g1;
 }
 
 double MicrofacetDiffuseSurface::exact_first_order(const Direction& wi, const Direction& wo) const {
@@ -121,7 +121,7 @@ double MicrofacetDiffuseSurface::exact_first_order(const Direction& wi, const Di
                                : shared_visibility(distribution_, alpha_, wi, seen,
                                                    [&](const Direction& m) { return facet_.body(wi, seen, m); });
   // The mean over visible normals is E[(wi·m)⁺] = K(wi, w) G1(w)/(w·n).
-  return weight(wi, wo) * shared / (seen.z * (1.0 + smith_lambda(distribution_, alpha_, seen)));
+  return weight(wi, wo) * shared / (pi * wi.z * seen.z * (1.0 + smith_lambda(distribution_, alpha_, seen)));
 }
 
 const SmithOrders& MicrofacetDiffuseSurface::smith_orders() const {
@@ -131,12 +131,12 @@ const SmithOrders& MicrofacetDiffuseSurface::smith_orders() const {
   return *smith_orders_;
 }
 
+bool MicrofacetDiffuseSurface::has_exact() const {
+  return bounces_ == 1 || (facet_.kind() == FacetKind::lambert && alpha_.x == alpha_.y);
+}
+
 void MicrofacetDiffuseSurface::exact_row(const Direction& wo, std::span<const Direction> wi, const Line& line) const {
-  const bool solvable = facet_.kind() == FacetKind::lambert && alpha_.x == alpha_.y;
-  if (bounces_ > 1 && !solvable) {
-    throw Error(ExitCode::usage, "more than one bounce is solved for isotropic Lambertian facets only", "--exact",
-                "leave it out: Monte Carlo gives the value with its error");
-  }
+  if (!has_exact()) return Integrator::exact_row(wo, wi, line);
   const std::size_t n = wi.size();
   const Direction view = to_surface(wo);
   std::vector<Direction> lights(n);
@@ -195,11 +195,9 @@ void MicrofacetDiffuseSurface::sample_row(const Direction& wo, std::span<const D
                         order_sums(static_cast<std::size_t>(std::min(order, most_orders))));
       }
     }
+    for (std::size_t j = 0; j < n; ++j) sums[j] *= weight(lights[j], view);
   }
-  for (std::size_t j = 0; j < n; ++j) {
-    sums[j] *= weight(lights[j], view) / samples;
-    for (std::size_t k = 1; k < sums.size() / n; ++k) sums[k * n + j] /= pi * lights[j].z * samples;
-  }
+  for (std::size_t k = 0; k < sums.size(); ++k) sums[k] /= pi * lights[k % n].z * samples;
   finish(sums, n, line);
 }
 
@@ -211,7 +209,12 @@ void MicrofacetDiffuseSurface::sample_paths(const Direction& wo, std::span<const
   const Direction seen = seen_from(wo);
   const bool interfaced = facet_.kind() == FacetKind::interfaced;
   std::vector<double> lambda_i(n);
-  for (std::size_t j = 0; j < n; ++j) lambda_i[j] = smith_lambda(distribution_, alpha_, wi[j]);
+  // Only the first facet's light has its masking in closed form; what comes by way of a mirror may be of order 1 too.
+  std::vector<double> first_weight(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    lambda_i[j] = smith_lambda(distribution_, alpha_, wi[j]);
+    first_weight[j] = weight(wi[j], wo);
+  }
   const auto add = [&](int order, std::size_t j, double value) {
     const auto slot = static_cast<std::size_t>(std::min(order, most_orders) - 1) * n + j;
     if (sums.size() <= slot) sums.resize((slot / n + 1) * n, 0.0);
@@ -222,7 +225,9 @@ void MicrofacetDiffuseSurface::sample_paths(const Direction& wo, std::span<const
     Direction m = sample_visible_normal(distribution_, alpha_, seen, numbers.next_pair());
     for (std::size_t j = 0; j < n; ++j) {
       const double cosine = dot(m, wi[j]);
-      if (cosine > 0.0) sums[j] += cosine * (facet_.kind() == FacetKind::lambert ? 1.0 : facet_.body(wi[j], seen, m));
+      if (cosine > 0.0) {
+        sums[j] += first_weight[j] * cosine * (facet_.kind() == FacetKind::lambert ? 1.0 : facet_.body(wi[j], seen, m));
+      }
     }
     if (bounces_ == 1) continue;
     // From here on the path's depth is drawn, and light on the way in is shadowed by it.

@@ -127,6 +127,7 @@ class MicrofacetDiffuseSurface : public Integrator {
   int channels() const override { return grey_ ? 1 : 3; }
   /// Interfaced facets have none to keep apart: their albedo is not a power of ρ.
   int orders() const override;
+  bool has_exact() const override;
   /// By quadrature (relative error estimate below 1e-11, of anisotropic and other than Lambertian facets 1e-9); all
   /// bounces of Lambertian isotropic facets by SmithOrders, to about 1e-9 of f.
   void exact_row(const Direction& wo, std::span<const Direction> wi, const Line& line) const override;
@@ -142,7 +143,7 @@ class MicrofacetDiffuseSurface : public Integrator {
 
   /// The direction whose visible normals are sampled: wo, or the normal for area_mean.
   Direction seen_from(const Direction& wo) const;
-  /// Order 1 of f per unit of albedo = weight × E[(wi·m)⁺ body] over those normals.
+  /// G2/G1: order 1 of f per unit of albedo = weight × E[(wi·m)⁺ body] / (π μi) over those normals.
   double weight(const Direction& wi, const Direction& wo) const;
   double exact_first_order(const Direction& wi, const Direction& wo) const;
   const SmithOrders& smith_orders() const;

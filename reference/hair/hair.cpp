@@ -139,6 +139,7 @@ Reference hair_reference() {
           .source = Hair::source,
           .parameters = describe_parameters<Hair>(),
           .sphere = true,
+          .fibre = true,
           .make = [](const ParameterValues& values) -> std::unique_ptr<const Integrator> {
             return std::make_unique<HairFibre>(values);
           }};

@@ -158,6 +158,7 @@ class HairFibre : public Integrator {
   explicit HairFibre(const ParameterValues& values);
 
   int channels() const override;
+  bool has_exact() const override { return true; }
   void exact_row(const Direction& wo, std::span<const Direction> wi, const Line& line) const override;
   void sample_row(const Direction& wo, std::span<const Direction> wi, const SamplePoints& points, std::uint32_t samples,
                   bool fast, const Line& line) const override;
