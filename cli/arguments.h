@@ -32,6 +32,7 @@ struct Context {
 void add_models(CLI::App& app, Context& context);
 void add_eval(CLI::App& app, Context& context);
 void add_albedo(CLI::App& app, Context& context);
+void add_albedo_table(CLI::App& app, Context& context);
 void add_references(CLI::App& app, Context& context);
 void add_reference(CLI::App& app, Context& context);
 void add_render(CLI::App& app, Context& context);

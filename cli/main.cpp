@@ -88,6 +88,7 @@ int run(int argc, char** argv) {
   add_models(app, context);
   add_eval(app, context);
   add_albedo(app, context);
+  add_albedo_table(app, context);
   add_references(app, context);
   add_reference(app, context);
   add_render(app, context);

@@ -24,11 +24,11 @@ class TerminalMonitor : public Monitor {
   TerminalMonitor(bool shown, bool terminal) : shown_(shown), terminal_(terminal) {}
   ~TerminalMonitor() override { clear(); }
 
-  void begin(std::string_view what, std::uint64_t steps) override {
+  void begin(std::string_view what, std::uint64_t steps, std::uint64_t done) override {
     const std::lock_guard lock(mutex_);
     what_ = what;
     steps_ = steps;
-    done_ = 0;
+    done_ = resumed_ = done;
     start_ = last_ = Clock::now();
   }
 
@@ -41,10 +41,14 @@ class TerminalMonitor : public Monitor {
     if (!shown_ || now - last_ < pause || steps_ == 0) return;
     last_ = now;
     const double elapsed = std::chrono::duration<double>(now - start_).count();
-    const double fraction = static_cast<double>(done_) / static_cast<double>(steps_);
-    const auto left = static_cast<int>(std::ceil(elapsed * (1.0 - fraction) / fraction));
-    fmt::print(stderr, "{}{}: {:3.0f} %, {}:{:02} left{}", terminal_ ? "\r" : "", what_, 100.0 * fraction, left / 60,
-               left % 60, terminal_ ? "\033[K" : "\n");
+    // What earlier runs did took none of this run's time.
+    const double rate = static_cast<double>(done_ - resumed_) / elapsed;
+    const auto left = static_cast<std::int64_t>(std::ceil(static_cast<double>(steps_ - done_) / rate));
+    const std::string hours =
+        left >= 3600 ? fmt::format("{}:{:02}", left / 3600, left / 60 % 60) : fmt::format("{}", left / 60);
+    fmt::print(stderr, "{}{}: {:3.0f} %, {}:{:02} left{}", terminal_ ? "\r" : "", what_,
+               100.0 * static_cast<double>(done_) / static_cast<double>(steps_), hours, left % 60,
+               terminal_ ? "\033[K" : "\n");
     std::fflush(stderr);
     drawn_ = terminal_;
   }
@@ -66,7 +70,7 @@ class TerminalMonitor : public Monitor {
 
   std::mutex mutex_;
   std::string what_;
-  std::uint64_t steps_ = 0, done_ = 0;
+  std::uint64_t steps_ = 0, done_ = 0, resumed_ = 0;
   Clock::time_point start_, last_;
   bool shown_, terminal_, drawn_ = false;
 };

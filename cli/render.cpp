@@ -9,6 +9,35 @@
 
 namespace lobefit {
 
+namespace {
+
+/// Says what can't be seen in the table at a glance: masked entries, missed targets.
+void warn(const Context& context, const Table& table) {
+  warn_about_failed(context, table);
+  if (table.stderr_target <= 0.0) return;
+  std::size_t above = 0;
+  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+    float error = 0.0f;
+    for (int c = 0; c < table.channels; ++c) error = std::max(error, table.standard_error(entry, c));
+    if (table.valid[entry] && error > static_cast<float>(table.stderr_target)) ++above;
+  }
+  if (above > 0) {
+    context.say(fmt::format("warning: {} of {} entries stopped at {} samples, above the target", above, table.entries(),
+                            most_samples));
+  }
+}
+
+/// Ctrl-C: what is kept, and how to go on.
+Error interrupted(const PartFile& part, std::size_t lines) {
+  if (part.kept() == 0) {
+    return {ExitCode::interrupted, "interrupted", "", "no line was finished yet, so nothing is kept"};
+  }
+  return {ExitCode::interrupted, fmt::format("interrupted: {} of {} lines are kept", part.kept(), lines),
+          part.path().string(), "the same command with --resume goes on"};
+}
+
+}  // namespace
+
 void add_render(CLI::App& app, Context& context) {
   CLI::App* verb =
       app.add_subcommand("render",
@@ -19,7 +48,8 @@ void add_render(CLI::App& app, Context& context) {
   struct Arguments {
     std::string name, grid = "default", output, facets = "shared";
     std::vector<std::string> settings, axes;
-    bool orders = false;
+    bool orders = false, resume = false;
+    std::string shard;
     SamplingArguments sampling;
   };
   const auto a = std::make_shared<Arguments>();
@@ -30,14 +60,19 @@ void add_render(CLI::App& app, Context& context) {
   verb->add_option("-o,--output", a->output, "Table to write (.exr)")->required();
   verb->add_option("--facets", a->facets,
                    "shared: one facet set for all lights of a line, fast, errors correlated (replicates are kept);\n"
-                   "independent: every entry its own")
+                   "independent: every entry its own. --stderr doubles the samples per line or per entry")
       ->check(CLI::IsMember({"shared", "independent"}))
       ->capture_default_str();
   verb->add_flag("--orders", a->orders,
                  "Keep the orders of scattering apart: any albedo follows from the table (table recolor)");
+  verb->add_flag("--resume", a->resume,
+                 "Go on with the finished lines that an interrupted run kept in OUTPUT.part; the same file results");
+  const CLI::Option* shard = verb->add_option(
+      "--shard", a->shard,
+      "I/N: only the I-th of N parts of the lines, to be joined with `table merge`; the others are masked");
   a->sampling.options.samples = 1u << 14;
   a->sampling.add_to(*verb, "per entry");
-  verb->callback([&context, a] {
+  verb->callback([&context, a, shard] {
     const std::vector<Axis> axes = parse_axes(a->axes);
     const RenderOptions options{.sampling = a->sampling.checked(context.seed),
                                 .exact = a->sampling.exact,
@@ -48,26 +83,47 @@ void add_render(CLI::App& app, Context& context) {
     const Grid grid = Grid::named_or_file(a->grid, reference && reference->sphere);
     ParameterValues values = reference ? reference->defaults() : model->defaults();
     set_parameters(values, a->settings);
-    OutputFile file(a->output, context.force);
+    RenderJob job;
+    if (shard->count() > 0) job.shards = Shards::parse(a->shard, "--shard");
+    // A finished output may lie there when resuming; whether it is this render's is looked at before the work.
+    OutputFile file(a->output, context.force || a->resume);
+    PartFile part(a->output, {.resume = a->resume, .overwrite = context.force});
+    job.part = &part;
     const auto monitor = context.monitor();
-    Table table = reference ? render(*reference, values, axes, grid, options, *monitor)
-                            : render(*model, values, axes, grid, *monitor);
-    table.command = context.command;
-    table.write(file.temporary());
-    file.commit();
+    Table table;
+    try {
+      table = reference ? render(*reference, values, axes, grid, options, *monitor, job)
+                        : render(*model, values, axes, grid, *monitor, job);
+    } catch (const Interrupted&) {
+      throw interrupted(part, part.wanted());
+    }
+    if (part.resumed() > 0 && !part.output_is_finished()) {
+      context.say(fmt::format("went on from {} of {} lines{}", part.resumed(), part.wanted(),
+                              part.dropped() ? "; what was torn was rendered again" : ""));
+    }
+    if (part.output_is_finished()) {
+      context.say(fmt::format("{} is finished already", a->output));
+    } else {
+      table.command = context.command;
+      table.write(file.temporary());
+      file.commit();
+    }
+    part.remove();
+    warn(context, table);
     float worst = 0.0f;
-    for (const float error : table.stderr_values) worst = std::max(worst, error);
-    if (options.sampling.stderr_target > 0.0 && worst > static_cast<float>(options.sampling.stderr_target)) {
-      context.say(fmt::format("warning: some entries stopped at {} samples, above the target", most_samples));
+    for (std::size_t slot = 0; slot < table.stderr_values.size(); ++slot) {
+      if (table.valid[slot % table.entries()]) worst = std::max(worst, table.stderr_values[slot]);
     }
     if (context.json) {
       Json description = table.describe();
       description["file"] = a->output;
       description["largest_stderr"] = worst;
+      description["failed"] = table.failed().size();
       std::cout << description.dump(2) << "\n";
     } else {
-      fmt::print("{}: {} entries ({} masked), {}, largest standard error {:.2e} 1/sr\n", a->output, table.entries(),
-                 table.masked(), table.method, worst);
+      fmt::print("{}: {} entries ({} masked), {}{}, largest standard error {:.2e} 1/sr\n", a->output, table.entries(),
+                 table.masked(), table.shards.count > 1 ? "shard " + table.shards.text() + ", " : "", table.method,
+                 worst);
     }
   });
 }

@@ -49,4 +49,12 @@ inline void warn_above_target(const Context& context, const Estimate& estimate, 
   }
 }
 
+/// Entries whose results were no finite numbers: never silent.
+inline void warn_about_failed(const Context& context, const Table& table) {
+  const std::vector<std::size_t> failed = table.failed();
+  if (failed.empty()) return;
+  context.say(fmt::format("warning: {} of {} entries {} not finite and masked; the first is at {}", failed.size(),
+                          table.entries(), failed.size() == 1 ? "is" : "are", table.place(failed.front())));
+}
+
 }  // namespace lobefit

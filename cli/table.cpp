@@ -4,8 +4,11 @@
 #include <iostream>
 
 #include "cli/arguments.h"
+#include "cli/sampling.h"
 #include "cli/slice.h"
+#include "reference/merge.h"
 #include "reference/metric.h"
+#include "reference/output_file.h"
 #include "report/image.h"
 
 namespace lobefit {
@@ -126,14 +129,97 @@ void add_compare(CLI::App& tables, Context& context) {
   });
 }
 
+void print_written(const Context& context, const Table& table, const std::string& output) {
+  if (context.json) {
+    Json description = table.describe();
+    description["file"] = output;
+    description["failed"] = table.failed().size();
+    std::cout << description.dump(2) << "\n";
+  } else {
+    fmt::print("{}: {} entries ({} masked)\n", output, table.entries(), table.masked());
+  }
+}
+
+void add_merge(CLI::App& tables, Context& context) {
+  CLI::App* verb = tables.add_subcommand("merge",
+                                         "Joins the shards of one render into the table that one run would have made\n"
+                                         "  for i in 1 2 3; do\n"
+                                         "    lobefit render microfacet_diffuse --shard $i/3 -o part$i.exr\n"
+                                         "  done\n"
+                                         "  lobefit table merge part1.exr part2.exr part3.exr -o truth.exr");
+  struct Arguments {
+    std::vector<std::string> names;
+    std::string output;
+    bool partial = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  verb->add_option("SHARDS", a->names, "Tables that `lobefit render --shard` wrote")->required();
+  verb->add_option("-o,--output", a->output, "Table to write (.exr)")->required();
+  verb->add_flag("--partial", a->partial, "Mask the lines of missing shards; the result can be merged further");
+  verb->callback([&context, a] {
+    OutputFile file(a->output, context.force);
+    const std::vector<std::filesystem::path> paths(a->names.begin(), a->names.end());
+    const Table table = merge_shards(paths, a->partial);
+    table.write(file.temporary());
+    file.commit();
+    if (table.shards.count > 1)
+      context.say(fmt::format("warning: the table holds shards {} only", table.shards.text()));
+    warn_about_failed(context, table);
+    print_written(context, table, a->output);
+  });
+}
+
+void add_recolor(CLI::App& tables, Context& context) {
+  CLI::App* verb = tables.add_subcommand("recolor",
+                                         "The same surface at another albedo, from a table rendered with --orders\n"
+                                         "  lobefit render microfacet_diffuse --set bounces=all --orders -o truth.exr\n"
+                                         "  lobefit table recolor truth.exr --set albedo=0.9,0.5,0.2 -o gold.exr\n"
+                                         "No further sampling: errors follow from those of the orders.");
+  struct Arguments {
+    std::string name, output;
+    std::vector<std::string> settings;
+  };
+  const auto a = std::make_shared<Arguments>();
+  verb->add_option("TABLE", a->name, "Table that `lobefit render --orders` wrote")->required();
+  add_repeatable(*verb, "--set", a->settings, "albedo=VALUE or albedo=r,g,b")->required();
+  verb->add_option("-o,--output", a->output, "Table to write (.exr)")->required();
+  verb->callback([&context, a] {
+    OutputFile file(a->output, context.force);
+    const Table table = Table::read(a->name);
+    const Reference* reference = find_reference_or_null(table.model);
+    if (!reference || table.orders == 0) {
+      throw Error(ExitCode::usage, "the table keeps no orders of scattering", a->name,
+                  "render it with --orders: then any albedo follows from it");
+    }
+    // Names and ranges are those of the reference.
+    ParameterValues values = reference->defaults();
+    set_parameters(values, a->settings);
+    for (const std::string& setting : a->settings) {
+      if (setting.substr(0, setting.find('=')) != "albedo") {
+        throw Error(ExitCode::usage, "only the albedo can change without another render", "--set " + setting,
+                    "write --set albedo=r,g,b");
+      }
+    }
+    const std::span<const double> albedo = values.components(values.info("albedo"));
+    Table recolored = table.with_albedo({albedo.front(), albedo[albedo.size() / 2], albedo.back()});
+    // Both are needed to make it again.
+    recolored.command = table.command + " && " + context.command;
+    recolored.write(file.temporary());
+    file.commit();
+    print_written(context, recolored, a->output);
+  });
+}
+
 }  // namespace
 
 void add_table(CLI::App& app, Context& context) {
-  CLI::App* verb = app.add_subcommand("table", "Look into tables: info, slice, compare");
+  CLI::App* verb = app.add_subcommand("table", "Look into tables, join and recolour them: info, slice, compare, …");
   verb->require_subcommand(1);
   add_info(*verb, context);
   add_slice(*verb, context);
   add_compare(*verb, context);
+  add_merge(*verb, context);
+  add_recolor(*verb, context);
   for (CLI::App* part : verb->get_subcommands([](const CLI::App*) { return true; })) part->fallthrough();
 }
 

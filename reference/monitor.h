@@ -10,7 +10,8 @@ namespace lobefit {
 class Monitor {
  public:
   virtual ~Monitor() = default;
-  virtual void begin(std::string_view /*what*/, std::uint64_t /*steps*/) {}
+  /// `done` of the steps were made in earlier runs.
+  virtual void begin(std::string_view /*what*/, std::uint64_t /*steps*/, std::uint64_t /*done*/ = 0) {}
   virtual void advance(std::uint64_t /*steps*/) {}
   virtual void end() {}
   /// Throws Interrupted if the user asked to stop.

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -15,6 +16,34 @@ namespace lobefit {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Whether a process is at work: neither gone nor a zombie that nobody waits for, as in containers without an init.
+bool alive(int process) {
+  if (kill(process, 0) != 0 && errno == ESRCH) return false;
+  std::ifstream file("/proc/" + std::to_string(process) + "/stat");
+  std::string status;
+  std::getline(file, status);
+  const std::size_t name_end = status.rfind(')');
+  return name_end == std::string::npos || name_end + 2 >= status.size() || status[name_end + 2] != 'Z';
+}
+
+/// A program that was killed could not remove its temporary file; names hold the process.
+void remove_abandoned(const fs::path& folder, const std::string& prefix, const std::string& extension) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() <= prefix.size() + extension.size() || !name.starts_with(prefix) || !name.ends_with(extension)) {
+      continue;
+    }
+    const std::string number = name.substr(prefix.size(), name.size() - prefix.size() - extension.size());
+    if (number.size() > 9 || number.find_first_not_of("0123456789") != std::string::npos) continue;
+    if (!alive(std::stoi(number))) fs::remove(entry.path(), ignored);
+  }
+}
+
+}  // namespace
+
 OutputFile::OutputFile(fs::path path, bool overwrite) : path_(std::move(path)) {
   std::error_code ignored;
   if (fs::is_directory(path_, ignored)) {
@@ -23,8 +52,9 @@ OutputFile::OutputFile(fs::path path, bool overwrite) : path_(std::move(path)) {
   if (!overwrite && fs::exists(path_, ignored)) {
     throw Error(ExitCode::usage, "output exists", path_.string(), "choose another name, or add --force to replace it");
   }
-  temporary_ = path_.parent_path() /
-               ("." + path_.stem().string() + ".partial-" + std::to_string(getpid()) + path_.extension().string());
+  const std::string prefix = "." + path_.stem().string() + ".partial-", extension = path_.extension().string();
+  remove_abandoned(path_.parent_path(), prefix, extension);
+  temporary_ = path_.parent_path() / (prefix + std::to_string(getpid()) + extension);
   // Tried now, so that hours of work are not spent on a result that can't be saved.
   std::ofstream probe(temporary_, std::ios::binary);
   if (!probe) {

@@ -13,7 +13,8 @@ void Integrator::exact_row(const Direction&, std::span<const Direction>, const L
 }
 
 std::span<const Reference> references() {
-  static const std::array all{microfacet_diffuse_reference(), hair_reference()};
+  static const std::array all{microfacet_diffuse_reference(), microfacet_specular_reference(), layered_reference(),
+                              hair_reference()};
   return all;
 }
 

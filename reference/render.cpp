@@ -73,25 +73,50 @@ Canvas make_canvas(const ParameterValues& values, std::vector<Axis> parameter_ax
 
 double channel_of(const Rgb& value, int channel) { return channel == 0 ? value.x : channel == 1 ? value.y : value.z; }
 
-/// Stores one value; what is not a finite number is masked, never passed on.
 void store(Table& table, std::size_t entry, const Rgb& value) {
   for (int c = 0; c < table.channels; ++c) {
-    const double v = channel_of(value, c);
-    table.values[static_cast<std::size_t>(c) * table.entries() + entry] = static_cast<float>(v);
-    if (!std::isfinite(static_cast<float>(v))) table.valid[entry] = 0;
+    table.values[static_cast<std::size_t>(c) * table.entries() + entry] = static_cast<float>(channel_of(value, c));
   }
 }
 
-/// Runs `line(y)` for every line of the table. Lines are independent, so threads can't change the bits.
-void for_each_line(const Table& table, Monitor& monitor, const std::function<void(std::size_t)>& line) {
-  monitor.begin("render " + table.model, table.height());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, table.height(), 1), [&](const auto& range) {
-    for (std::size_t y = range.begin(); y < range.end(); ++y) {
-      monitor.check();
-      line(y);
-      monitor.advance(1);
+/// Runs `line(y)`, which advances the monitor by `steps`, for every line of the table that the job wants and earlier
+/// runs did not finish. Lines are independent, so neither threads nor shards nor interruptions can change their bits.
+void for_each_line(Table& table, std::uint64_t steps, Monitor& monitor, const RenderJob& job,
+                   const std::function<void(std::size_t)>& line) {
+  const std::size_t height = table.height();
+  if (job.shards.count > height) {
+    throw Error(ExitCode::usage,
+                std::to_string(height) + " lines can't be cut into " + std::to_string(job.shards.count) + " shards",
+                "--shard", "choose at most " + std::to_string(height) + " shards");
+  }
+  table.shards = job.shards;
+  const std::vector<bool> done = job.part ? job.part->begin(table) : std::vector<bool>(height, false);
+  std::vector<std::size_t> lines;
+  std::uint64_t finished = 0;
+  for (std::size_t y = 0; y < height; ++y) {
+    if (!job.shards.hold(y)) {
+      std::fill_n(table.valid.begin() + static_cast<std::ptrdiff_t>(y * table.width()), table.width(), std::uint8_t{0});
+    } else if (done[y]) {
+      ++finished;
+    } else {
+      lines.push_back(y);
     }
-  });
+  }
+  monitor.begin("render " + table.model, (finished + lines.size()) * steps, finished * steps);
+  try {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lines.size(), 1), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        monitor.check();
+        line(lines[i]);
+        // What is not a finite number is masked, never passed on.
+        table.mask_what_is_not_finite(lines[i] * table.width(), table.width());
+        if (job.part) job.part->keep(lines[i]);
+      }
+    });
+  } catch (...) {
+    if (job.part) job.part->flush();
+    throw;
+  }
   monitor.end();
 }
 
@@ -118,7 +143,8 @@ class LineWriter {
     }
   }
 
-  /// Means, errors and replicates of the line; returns the largest standard error of a value.
+  /// Means, errors and replicates of the line; returns the largest standard error of a value. Those that are no finite
+  /// numbers do not count: more samples would not mend them.
   double store_estimates() {
     double worst = 0.0;
     std::array<double, replicate_count> column;
@@ -129,7 +155,7 @@ class LineWriter {
         const std::size_t slot = static_cast<std::size_t>(c) * table_->entries() + first_ + j;
         const MeanAndError result = summarise(column, slot, table_->stderr_values, table_->replicates);
         (c == 0 ? mean.x : c == 1 ? mean.y : mean.z) = result.mean;
-        worst = max(worst, result.standard_error);
+        if (std::isfinite(result.standard_error)) worst = max(worst, result.standard_error);
       }
       store(*table_, first_ + j, mean);
     }
@@ -163,13 +189,15 @@ class LineWriter {
 
 /// One line by Monte Carlo: entries [first, first + wi.size()).
 void sample_line(const Integrator& integrator, std::span<const Direction> wi, const Direction& wo, std::size_t first,
-                 std::uint64_t key, const RenderOptions& options, Table& table, Monitor& monitor) {
+                 std::uint64_t key, const RenderOptions& options, Table& table, Monitor& monitor,
+                 std::uint64_t steps_per_replicate) {
   LineWriter line(table, first, wi.size());
   for (SamplingOptions sampling = options.sampling;; sampling.samples *= 2) {
     for (std::uint32_t r = 0; r < replicate_count; ++r) {
       monitor.check();
       integrator.sample_row(wo, wi, SamplePoints(sampling.sampler, {sampling.seed, key, r}), sampling.per_replicate(),
-                            options.shared_facets, line.replicate(r));
+                            true, line.replicate(r));
+      if (steps_per_replicate > 0) monitor.advance(steps_per_replicate);
     }
     const double worst = line.store_estimates();
     if (sampling.stderr_target > 0.0 && worst > sampling.stderr_target && sampling.samples * 2 <= most_samples)
@@ -185,7 +213,7 @@ void sample_line(const Integrator& integrator, std::span<const Direction> wi, co
 }  // namespace
 
 Table render(const Reference& reference, const ParameterValues& values, std::vector<Axis> parameter_axes,
-             const Grid& grid, const RenderOptions& options, Monitor& monitor) {
+             const Grid& grid, const RenderOptions& options, Monitor& monitor, const RenderJob& job) {
   if (!reference.sphere) check_hemisphere(grid, std::string(reference.name));
   Canvas canvas = make_canvas(values, std::move(parameter_axes), grid);
   std::vector<std::unique_ptr<const Integrator>> integrators;
@@ -206,6 +234,8 @@ Table render(const Reference& reference, const ParameterValues& values, std::vec
   if (!options.exact) {
     table.seed = options.sampling.seed;
     table.samples = std::uint64_t{options.sampling.per_replicate()} * replicate_count;
+    table.sampler = options.sampling.sampler == Sampler::sobol ? "sobol" : "philox";
+    table.stderr_target = options.sampling.stderr_target;
     table.shared_facets = options.shared_facets;
     if (options.sampling.stderr_target > 0.0) table.sample_counts.assign(table.entries(), 0.0f);
     if (options.shared_facets) {
@@ -213,7 +243,10 @@ Table render(const Reference& reference, const ParameterValues& values, std::vec
       table.order_replicates.assign(table.order_values.size() * replicate_count, 0.0f);
     }
   }
-  for_each_line(table, monitor, [&](std::size_t y) {
+  // A line of shared facets may take minutes: progress shows its replicates, where their number is known before.
+  const bool whole_lines = options.exact || (options.shared_facets && table.stderr_target > 0.0);
+  const std::uint64_t steps = whole_lines ? 1 : options.shared_facets ? replicate_count : table.width();
+  for_each_line(table, steps, monitor, job, [&](std::size_t y) {
     const std::size_t first = y * table.width();
     const Integrator& integrator = *integrators[y / table.lines_per_parameter()];
     const Direction wo = table.wo(first);
@@ -224,18 +257,20 @@ Table render(const Reference& reference, const ParameterValues& values, std::vec
       integrator.exact_row(wo, wi, line.replicate(0));
       line.store_exact();
     } else if (options.shared_facets) {
-      sample_line(integrator, wi, wo, first, y, options, table, monitor);
+      sample_line(integrator, wi, wo, first, y, options, table, monitor, whole_lines ? 0 : 1);
     } else {
       for (std::size_t x = 0; x < wi.size(); ++x) {
-        sample_line(integrator, {&wi[x], 1}, wo, first + x, first + x, options, table, monitor);
+        sample_line(integrator, {&wi[x], 1}, wo, first + x, first + x, options, table, monitor, 0);
+        monitor.advance(1);
       }
     }
+    if (whole_lines) monitor.advance(1);
   });
   return std::move(canvas.table);
 }
 
 Table render(const Model& model, const ParameterValues& values, std::vector<Axis> parameter_axes, const Grid& grid,
-             Monitor& monitor) {
+             Monitor& monitor, const RenderJob& job) {
   check_hemisphere(grid, std::string(model.info->name));
   Canvas canvas = make_canvas(values, std::move(parameter_axes), grid);
   Table& table = canvas.table;
@@ -245,11 +280,12 @@ Table render(const Model& model, const ParameterValues& values, std::vector<Axis
   }
   table.allocate();
   table.method = "exact";
-  for_each_line(table, monitor, [&](std::size_t y) {
+  for_each_line(table, 1, monitor, job, [&](std::size_t y) {
     const std::span<const double> flat = canvas.rows[y / table.lines_per_parameter()].flat();
     for (std::size_t entry = y * table.width(); entry < (y + 1) * table.width(); ++entry) {
       store(table, entry, model.evaluate(flat, table.wi(entry), table.wo(entry)));
     }
+    monitor.advance(1);
   });
   return std::move(canvas.table);
 }

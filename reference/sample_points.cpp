@@ -1,6 +1,8 @@
 // Sobol points under a nested uniform (Owen) scramble, done by hashing.
 #include "reference/sample_points.h"
 
+#include <algorithm>
+
 #include "models/instruction_sets.h"
 #include "models/scalar.h"
 
@@ -11,10 +13,11 @@ namespace {
 // Everything here is written for loops that vectorise: shifts, masks and products only.
 
 LOBEFIT_TEXT std::uint32_t reverse_bits(std::uint32_t x) {
+  // Bytes are not exchanged in one go: GCC would see a byte swap there, and plain AVX-512 has none for its full width.
+  x = ((x >> 8) & 0x00FF00FFu) | ((x & 0x00FF00FFu) << 8);
   x = ((x >> 1) & 0x55555555u) | ((x & 0x55555555u) << 1);
   x = ((x >> 2) & 0x33333333u) | ((x & 0x33333333u) << 2);
   x = ((x >> 4) & 0x0F0F0F0Fu) | ((x & 0x0F0F0F0Fu) << 4);
-  x = ((x >> 8) & 0x00FF00FFu) | ((x & 0x00FF00FFu) << 8);
   return (x >> 16) | (x << 16);
 }
 
@@ -87,6 +90,17 @@ LOBEFIT_CLONES [[gnu::noinline]] void gather_philox(const std::uint32_t* __restr
   }
 }
 
+LOBEFIT_CLONES [[gnu::noinline]] void fill_sobol_float(std::uint32_t first, std::uint32_t scramble_u,
+                                                       std::uint32_t scramble_v, std::size_t n, float* __restrict u,
+                                                       float* __restrict v) {
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t index = first + static_cast<std::uint32_t>(i);
+    u[i] = float_unit_interval(nested_uniform_scramble(index, scramble_u));
+    v[i] = float_unit_interval(nested_uniform_scramble(sobol_second_reversed(index), scramble_v));
+  }
+}
+
 LOBEFIT_CLONES [[gnu::noinline]] void fill_sobol(std::uint32_t first, std::uint32_t scramble_u,
                                                  std::uint32_t scramble_v, std::size_t n, double* __restrict u,
                                                  double* __restrict v) {
@@ -141,6 +155,18 @@ void SamplePoints::fill(std::uint32_t first, std::span<double> u, std::span<doub
   }
 }
 
+void SamplePoints::fill(std::uint32_t first, std::span<float> u, std::span<float> v) const {
+  if (sampler_ == Sampler::sobol) {
+    return fill_sobol_float(first, scrambles_[0].u, scrambles_[0].v, u.size(), u.data(), v.data());
+  }
+  std::array<std::uint32_t, 256> indices;
+  for (std::size_t done = 0; done < u.size(); done += indices.size()) {
+    const std::size_t count = std::min(indices.size(), u.size() - done);
+    for (std::size_t i = 0; i < count; ++i) indices[i] = first + static_cast<std::uint32_t>(done + i);
+    fill(0, std::span<const std::uint32_t>(indices).first(count), u.subspan(done), v.subspan(done));
+  }
+}
+
 void SamplePoints::fill(std::uint32_t number, std::span<const std::uint32_t> indices, std::span<float> u,
                         std::span<float> v) const {
   if (sampler_ == Sampler::sobol && number < sobol_pairs && number > 0) {
@@ -151,10 +177,7 @@ void SamplePoints::fill(std::uint32_t number, std::span<const std::uint32_t> ind
                   static_cast<std::uint32_t>(key_.seed), static_cast<std::uint32_t>(key_.seed >> 32), indices.size(),
                   u.data(), v.data());
   } else {
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      const std::array<double, 2> point = pair(indices[i], number);
-      u[i] = static_cast<float>(point[0]), v[i] = static_cast<float>(point[1]);
-    }
+    for (std::size_t i = 0; i < indices.size(); ++i) fill(indices[i], u.subspan(i, 1), v.subspan(i, 1));
   }
 }
 

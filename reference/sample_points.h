@@ -46,6 +46,8 @@ class SamplePoints {
 
   /// Pairs 0 of first, first + 1, …, one array per coordinate: the same numbers, Sobol's ten times as fast.
   void fill(std::uint32_t first, std::span<double> u, std::span<double> v) const;
+  /// The same in float, as the middles of cells 2^-23 wide.
+  void fill(std::uint32_t first, std::span<float> u, std::span<float> v) const;
   /// Pairs `number` of some indices, in float: the middles of cells 2^-23 wide. Arrays may be longer than `indices`.
   void fill(std::uint32_t number, std::span<const std::uint32_t> indices, std::span<float> u, std::span<float> v) const;
 

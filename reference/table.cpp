@@ -94,6 +94,14 @@ std::size_t Table::parameter_rows() const {
 
 std::size_t Table::masked() const { return static_cast<std::size_t>(std::count(valid.begin(), valid.end(), 0)); }
 
+std::vector<std::size_t> Table::failed() const {
+  std::vector<std::size_t> result;
+  for (std::size_t entry = 0; entry < entries(); ++entry) {
+    if (!valid[entry] && shards.hold(entry / width())) result.push_back(entry);
+  }
+  return result;
+}
+
 void Table::allocate() {
   const std::size_t count = static_cast<std::size_t>(channels) * entries();
   values.assign(count, 0.0f);
@@ -103,12 +111,57 @@ void Table::allocate() {
   order_stderr.assign(order_values.size(), 0.0f);
 }
 
+std::vector<Plane> Table::planes() {
+  constexpr std::array<const char*, 3> rgb_names{"R", "G", "B"};
+  std::vector<Plane> result;
+  for (int c = 0; c < channels; ++c) {
+    const std::size_t offset = static_cast<std::size_t>(c) * entries();
+    const std::string name = channels == 1 ? "Y" : rgb_names[static_cast<std::size_t>(c)];
+    result.push_back({name, values.data() + offset});
+    result.push_back({"stderr." + name, stderr_values.data() + offset});
+    for (std::size_t r = 0; r * values.size() < replicates.size(); ++r) {
+      result.push_back({"replicate." + std::to_string(r) + "." + name, replicates.data() + r * values.size() + offset});
+    }
+  }
+  for (std::size_t n = 0; n < static_cast<std::size_t>(orders); ++n) {
+    const std::string name = "order." + std::to_string(n + 1) + ".Y";
+    const std::size_t offset = n * entries();
+    result.push_back({name, order_values.data() + offset});
+    result.push_back({"stderr." + name, order_stderr.data() + offset});
+    for (std::size_t r = 0; r * order_values.size() < order_replicates.size(); ++r) {
+      result.push_back(
+          {"replicate." + std::to_string(r) + "." + name, order_replicates.data() + r * order_values.size() + offset});
+    }
+  }
+  if (!sample_counts.empty()) result.push_back({"samples", sample_counts.data()});
+  return result;
+}
+
+void Table::mask_what_is_not_finite(std::size_t first, std::size_t n) {
+  for (const Plane& plane : planes()) {
+    for (std::size_t entry = first; entry < first + n; ++entry) {
+      if (!std::isfinite(plane.data[entry])) valid[entry] = 0;
+    }
+  }
+}
+
 Direction Table::wi(std::size_t entry) const {
   return direction(radians(grid.theta_i.values[theta_i_index(entry)]), radians(grid.phi.values[phi_index(entry)]));
 }
 
 Direction Table::wo(std::size_t entry) const {
   return direction(radians(grid.theta_o.values[theta_o_index(entry)]), 0.0);
+}
+
+std::string Table::place(std::size_t entry) const {
+  std::string text = "theta_i " + number_text(grid.theta_i.values[theta_i_index(entry)]) + ", theta_o " +
+                     number_text(grid.theta_o.values[theta_o_index(entry)]) + ", phi " +
+                     number_text(grid.phi.values[phi_index(entry)]);
+  const std::vector<double> coordinates = parameter_values(parameter_row(entry));
+  for (std::size_t i = 0; i < coordinates.size(); ++i) {
+    text += ", " + parameter_axes[i].name + " " + number_text(coordinates[i]);
+  }
+  return text;
 }
 
 std::vector<double> Table::parameter_values(std::size_t row) const {
@@ -178,6 +231,12 @@ Table Table::with_albedo(const Rgb& albedo) const {
     throw Error(ExitCode::usage, "the table keeps no orders of scattering", "",
                 "render it with --orders: then any albedo follows from it");
   }
+  const auto own = parameters.find("albedo");
+  if (own == parameters.end() || !(own->is_array() || own->is_number())) {
+    // An axis, or a reference whose orders are no powers of an albedo.
+    throw Error(ExitCode::usage, "the table has no single albedo that could be another", model,
+                "give a table that was rendered with --orders at one albedo");
+  }
   Table result = *this;
   result.channels = albedo.x == albedo.y && albedo.x == albedo.z ? 1 : 3;
   result.parameters["albedo"] = {albedo.x, albedo.y, albedo.z};
@@ -216,6 +275,7 @@ Table Table::row_slice(std::size_t row) const {
   const std::vector<double> coordinates = parameter_values(row);
   for (std::size_t i = 0; i < parameter_axes.size(); ++i) slice.parameters[parameter_axes[i].name] = coordinates[i];
   slice.parameter_axes.clear();
+  slice.shards = {};  // shards count lines of the whole table
   const std::size_t count = slice.entries(), first = row * count;
   const auto cut = [&](const auto& all, auto& part) {
     part.clear();
@@ -248,6 +308,14 @@ Json Table::describe() const {
   add(grid.theta_o);
   add(grid.theta_i);
   add(grid.phi);
+  Json provenance{
+      {"reference", model}, {"params", parameters}, {"method", method}, {"seed", seed}, {"samples", samples}};
+  if (!sampler.empty()) provenance["sampler"] = sampler;
+  if (stderr_target > 0.0) provenance["stderr_target"] = stderr_target;
+  provenance["shared_facets"] = shared_facets;
+  if (shards.count > 1) provenance["shard"] = shards.text();
+  provenance["version"] = version;
+  provenance["command"] = command;
   return {{"axes", axes},
           {"coordinates", "spherical"},
           {"quantity", "brdf 1/sr"},
@@ -256,15 +324,46 @@ Json Table::describe() const {
           {"masked", masked()},
           {"replicates", replicates.empty() ? 0 : replicate_count},
           {"orders", orders},
-          {"provenance",
-           {{"reference", model},
-            {"params", parameters},
-            {"method", method},
-            {"seed", seed},
-            {"samples", samples},
-            {"shared_facets", shared_facets},
-            {"version", version},
-            {"command", command}}}};
+          {"provenance", provenance}};
+}
+
+Json Table::fingerprint() const {
+  const Json description = describe();
+  Json result = description["provenance"];
+  result.erase("command");
+  result.erase("shard");
+  result["channels"] = description["channels"];
+  result["orders"] = orders;
+  result["axes"] = Json::object();
+  for (const Json& axis : description["axes"]) {
+    result["axes"][axis["name"].get<std::string>()] = {{"kind", axis["kind"]}, {"values", axis["values"]}};
+  }
+  return result;
+}
+
+std::string differences(const Json& there, const Json& here) {
+  std::string result;
+  const auto told = [](const Json& value) {
+    const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+    constexpr std::size_t longest = 60;
+    return text.size() <= longest ? text : "";
+  };
+  const auto compare = [&](const auto& self, const Json& a, const Json& b, const std::string& name) -> void {
+    if (a == b) return;
+    if (a.is_object() && b.is_object()) {
+      const std::string prefix = name.empty() ? "" : name + ".";
+      for (const auto& [key, value] : a.items()) self(self, value, b.contains(key) ? b[key] : Json(), prefix + key);
+      for (const auto& [key, value] : b.items()) {
+        if (!a.contains(key)) self(self, Json(), value, prefix + key);
+      }
+      return;
+    }
+    if (!result.empty()) result += ", ";
+    const std::string then = told(a), now = told(b);
+    result += then.empty() || now.empty() ? name + " differs" : name + " is " + then + " there and " + now + " here";
+  };
+  compare(compare, there, here, "");
+  return result.empty() && there != here ? "axes are in another order" : result;
 }
 
 }  // namespace lobefit

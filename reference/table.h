@@ -13,6 +13,7 @@
 
 #include "models/geometry.h"
 #include "reference/estimate.h"
+#include "reference/shards.h"
 
 namespace lobefit {
 
@@ -42,6 +43,12 @@ struct Grid {
   static Grid from_json(const JsonReader& reader, bool sphere = false);
 };
 
+/// One named plane of a table's picture.
+struct Plane {
+  std::string name;
+  float* data;  // [entry]
+};
+
 struct Table {
   Grid grid;
   std::vector<Axis> parameter_axes;
@@ -50,7 +57,10 @@ struct Table {
   Json parameters;     // its parameters that are not axes
   std::string method;  // "monte_carlo" or "exact"
   std::uint64_t seed = 0, samples = 0;
+  std::string sampler;         // "sobol" or "philox"; "" where exact
+  double stderr_target = 0.0;  // > 0: `samples` were doubled until no standard error exceeded it
   bool shared_facets = false;  // a line's entries share their facets, so their errors are correlated
+  Shards shards;               // which lines are rendered; the others are masked
   std::string version, command;
 
   std::vector<float> values;  // [channel][entry]
@@ -71,9 +81,15 @@ struct Table {
   std::size_t height() const { return lines_per_parameter() * parameter_rows(); }
   std::size_t entries() const { return width() * height(); }
   std::size_t masked() const;
+  /// Masked entries of the lines that were rendered: their results were no finite numbers.
+  std::vector<std::size_t> failed() const;
 
   /// Sizes the arrays to the axes, all entries valid and zero.
   void allocate();
+  /// Every plane of an allocated table, in file terms. The mask is apart.
+  std::vector<Plane> planes();
+  /// Masks those of the entries first, …, first + n - 1 of which any number is not finite.
+  void mask_what_is_not_finite(std::size_t first, std::size_t n);
   float value(std::size_t entry, int channel = 0) const {
     return values[static_cast<std::size_t>(channel) * entries() + entry];
   }
@@ -97,6 +113,8 @@ struct Table {
   /// The view lies in the plane of azimuth 0, the light at azimuth phi.
   Direction wi(std::size_t entry) const;
   Direction wo(std::size_t entry) const;
+  /// Where an entry lies: `theta_i 30, theta_o 0, phi 180, alpha 0.5`.
+  std::string place(std::size_t entry) const;
   /// Values of the parameter axes in one row.
   std::vector<double> parameter_values(std::size_t row) const;
 
@@ -113,6 +131,12 @@ struct Table {
   /// Reads what write() wrote; throws Error(invalid_input) naming the file and what is wrong in it.
   static Table read(const std::filesystem::path& path);
   Json describe() const;
+  /// What determines every bit of the values: tables that agree in it are parts of one render. Neither the command as
+  /// it was given nor the shards.
+  Json fingerprint() const;
 };
+
+/// In which entries two fingerprints differ: `seed is 1 there and 2 here, …`
+std::string differences(const Json& there, const Json& here);
 
 }  // namespace lobefit

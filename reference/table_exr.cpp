@@ -20,45 +20,6 @@ namespace lobefit {
 
 namespace {
 
-const std::array<std::string, 3> rgb_names{"R", "G", "B"};
-
-std::string channel_name(const Table& table, int channel) {
-  return table.channels == 1 ? "Y" : rgb_names[static_cast<std::size_t>(channel)];
-}
-
-/// One named plane of a table's picture.
-struct Plane {
-  std::string name;
-  float* data;
-};
-
-/// Every float plane of an allocated table, in file terms. The mask is apart: it is stored as floats 0 and 1.
-std::vector<Plane> planes(Table& table) {
-  std::vector<Plane> result;
-  for (int c = 0; c < table.channels; ++c) {
-    const std::size_t offset = static_cast<std::size_t>(c) * table.entries();
-    const std::string name = channel_name(table, c);
-    result.push_back({name, table.values.data() + offset});
-    result.push_back({"stderr." + name, table.stderr_values.data() + offset});
-    for (std::size_t r = 0; r * table.values.size() < table.replicates.size(); ++r) {
-      result.push_back(
-          {"replicate." + std::to_string(r) + "." + name, table.replicates.data() + r * table.values.size() + offset});
-    }
-  }
-  for (std::size_t n = 0; n < static_cast<std::size_t>(table.orders); ++n) {
-    const std::string name = "order." + std::to_string(n + 1) + ".Y";
-    const std::size_t offset = n * table.entries();
-    result.push_back({name, table.order_values.data() + offset});
-    result.push_back({"stderr." + name, table.order_stderr.data() + offset});
-    for (std::size_t r = 0; r * table.order_values.size() < table.order_replicates.size(); ++r) {
-      result.push_back({"replicate." + std::to_string(r) + "." + name,
-                        table.order_replicates.data() + r * table.order_values.size() + offset});
-    }
-  }
-  if (!table.sample_counts.empty()) result.push_back({"samples", table.sample_counts.data()});
-  return result;
-}
-
 Imf::Slice slice(float* data, std::size_t width) {
   return {Imf::FLOAT, reinterpret_cast<char*>(data), sizeof(float), sizeof(float) * width};
 }
@@ -87,12 +48,15 @@ void Table::write(const std::filesystem::path& path) const {
     attribute("seed", std::to_string(seed));
     attribute("samples", std::to_string(samples));
     attribute("shared_facets", shared_facets ? "true" : "false");
+    if (!sampler.empty()) attribute("sampler", sampler);
+    if (stderr_target > 0.0) attribute("stderr_target", number_text(stderr_target));
+    if (shards.count > 1) attribute("shard", shards.text());
     attribute("version", version);
     attribute("command", command);
 
     Table copy = *this;
     std::vector<float> mask(valid.begin(), valid.end());
-    std::vector<Plane> all = planes(copy);
+    std::vector<Plane> all = copy.planes();
     all.push_back({"A", mask.data()});
     Imf::FrameBuffer frame;
     for (const Plane& plane : all) {
@@ -126,6 +90,9 @@ Table Table::read(const std::filesystem::path& path) {
   try {
     Imf::InputFile file(path.c_str());
     const Imf::Header& header = file.header();
+    const auto has = [&](const char* name) {
+      return header.findTypedAttribute<Imf::StringAttribute>(std::string("lobefit:") + name) != nullptr;
+    };
     const auto attribute = [&](const char* name) -> std::string {
       const auto* found = header.findTypedAttribute<Imf::StringAttribute>(std::string("lobefit:") + name);
       if (!found)
@@ -193,13 +160,21 @@ Table Table::read(const std::filesystem::path& path) {
     table.seed = number("seed");
     table.samples = number("samples");
     table.shared_facets = attribute("shared_facets") == "true";
+    if (has("sampler")) table.sampler = attribute("sampler");
+    try {
+      if (has("stderr_target")) table.stderr_target = parse_number(attribute("stderr_target"), "lobefit:stderr_target");
+      if (has("shard")) table.shards = Shards::parse(attribute("shard"), "lobefit:shard");
+    } catch (const Error& error) {
+      throw error.inside(ExitCode::invalid_input, path.string());
+    }
+    if (table.shards.count > table.height()) throw invalid(path, "attribute lobefit:shard has more shards than lines");
     table.version = attribute("version");
     table.command = attribute("command");
 
     table.channels = header.channels().findChannel("Y") ? 1 : 3;
     while (header.channels().findChannel("order." + std::to_string(table.orders + 1) + ".Y")) ++table.orders;
     table.allocate();
-    if (header.channels().findChannel("replicate.0." + channel_name(table, 0))) {
+    if (header.channels().findChannel(std::string("replicate.0.") + (table.channels == 1 ? "Y" : "R"))) {
       table.replicates.assign(table.values.size() * replicate_count, 0.0f);
     }
     if (header.channels().findChannel("replicate.0.order.1.Y")) {
@@ -207,7 +182,7 @@ Table Table::read(const std::filesystem::path& path) {
     }
     if (header.channels().findChannel("samples")) table.sample_counts.assign(table.entries(), 0.0f);
     std::vector<float> mask(table.entries());
-    std::vector<Plane> all = planes(table);
+    std::vector<Plane> all = table.planes();
     all.push_back({"A", mask.data()});
     Imf::FrameBuffer frame;
     for (const Plane& plane : all) {
@@ -217,16 +192,8 @@ Table Table::read(const std::filesystem::path& path) {
     }
     file.setFrameBuffer(frame);
     file.readPixels(0, static_cast<int>(table.height()) - 1);
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-      bool finite = mask[i] != 0.0f;
-      for (int c = 0; c < table.channels; ++c) {
-        finite = finite && std::isfinite(table.value(i, c)) && std::isfinite(table.standard_error(i, c));
-        for (int r = 0; r < replicate_count && !table.replicates.empty(); ++r) {
-          finite = finite && std::isfinite(table.replicate(r, i, c));
-        }
-      }
-      table.valid[i] = finite ? 1 : 0;
-    }
+    for (std::size_t i = 0; i < mask.size(); ++i) table.valid[i] = mask[i] != 0.0f ? 1 : 0;
+    table.mask_what_is_not_finite(0, table.entries());
     return table;
   } catch (const Error&) {
     throw;

@@ -2,6 +2,7 @@
 
 #include <boost/math/special_functions/erf.hpp>
 
+#include "models/float_functions.h"
 #include "models/instruction_sets.h"
 
 namespace lobefit {
@@ -64,13 +65,33 @@ LOBEFIT_TEXT Direction sample_ggx(const GgxView& view, double u, double v) {
   return normalize(Direction{view.alpha.x * m.x, view.alpha.y * m.y, max(m.z, 0.0)});
 }
 
-LOBEFIT_CLONES [[gnu::noinline]] void fill_ggx(const GgxView& view, std::size_t n, const double* __restrict u,
-                                               const double* __restrict v, float* __restrict x, float* __restrict y,
+/// sample_ggx() in float.
+LOBEFIT_CLONES [[gnu::noinline]] void fill_ggx(const GgxView& view, std::size_t n, const float* __restrict u,
+                                               const float* __restrict v, float* __restrict x, float* __restrict y,
                                                float* __restrict z) {
+  const auto alpha_x = static_cast<float>(view.alpha.x), alpha_y = static_cast<float>(view.alpha.y);
+  const auto ex = static_cast<float>(view.stretched.x), ey = static_cast<float>(view.stretched.y),
+             ez = static_cast<float>(view.stretched.z);
+  const auto t1x = static_cast<float>(view.t1.x), t1y = static_cast<float>(view.t1.y);
+  const auto t2x = static_cast<float>(view.t2.x), t2y = static_cast<float>(view.t2.y),
+             t2z = static_cast<float>(view.t2.z);
+  const float s = 0.5f * (1.0f + ez);
 #pragma GCC ivdep
   for (std::size_t i = 0; i < n; ++i) {
-    const Direction m = sample_ggx(view, u[i], v[i]);
-    x[i] = static_cast<float>(m.x), y[i] = static_cast<float>(m.y), z[i] = static_cast<float>(m.z);
+    float cosine, sine;
+    float_cosine_and_sine_of_turns(v[i], cosine, sine);
+    const float radius = __builtin_sqrtf(u[i]);
+    const float p1 = radius * cosine;
+    const float left = 1.0f - p1 * p1;
+    const float p2 = (1.0f - s) * __builtin_sqrtf(left > 0.0f ? left : 0.0f) + s * radius * sine;
+    const float rest = left - p2 * p2;
+    const float p3 = __builtin_sqrtf(rest > 0.0f ? rest : 0.0f);
+    const float mx = alpha_x * (t1x * p1 + t2x * p2 + ex * p3);
+    const float my = alpha_y * (t1y * p1 + t2y * p2 + ey * p3);
+    const float up = t2z * p2 + ez * p3;
+    const float mz = up > 0.0f ? up : 0.0f;
+    const float length = 1.0f / __builtin_sqrtf(mx * mx + my * my + mz * mz);
+    x[i] = mx * length, y[i] = my * length, z[i] = mz * length;
   }
 }
 
@@ -118,8 +139,8 @@ Direction sample_visible_normal(Distribution distribution, Alpha alpha, const Di
                                            : sample_beckmann(alpha, w, u);
 }
 
-void sample_visible_normals(Distribution distribution, Alpha alpha, const Direction& w, std::span<const double> u,
-                            std::span<const double> v, const FacetBatch& facets) {
+void sample_visible_normals(Distribution distribution, Alpha alpha, const Direction& w, std::span<const float> u,
+                            std::span<const float> v, const FacetBatch& facets) {
   if (distribution == Distribution::ggx) {
     return fill_ggx(make_ggx_view(alpha, w), u.size(), u.data(), v.data(), facets.x.data(), facets.y.data(),
                     facets.z.data());

@@ -23,8 +23,8 @@ struct FacetBatch {
   std::span<float> x, y, z;
 };
 
-/// The same for many points, rounded to float; vectorised for GGX.
-void sample_visible_normals(Distribution distribution, Alpha alpha, const Direction& w, std::span<const double> u,
-                            std::span<const double> v, const FacetBatch& facets);
+/// The same for many points in float; vectorised for GGX.
+void sample_visible_normals(Distribution distribution, Alpha alpha, const Direction& w, std::span<const float> u,
+                            std::span<const float> v, const FacetBatch& facets);
 
 }  // namespace lobefit

@@ -145,6 +145,136 @@ TEST_F(CommandLine, CtrlCLeavesNothingBroken) {
   EXPECT_TRUE(files().empty());
 }
 
+/// A run of the program that goes on beside the test, in `folder`; its stderr goes to the file `.log` there.
+class Running {
+ public:
+  Running(const fs::path& folder, std::vector<std::string> arguments) : child_(fork()) {
+    if (child_ != 0) return;
+    std::vector<char*> argv{const_cast<char*>("lobefit")};
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    if (chdir(folder.c_str()) != 0 || !std::freopen(".log", "w", stderr)) _exit(127);
+    execv(LOBEFIT_PROGRAM, argv.data());
+    _exit(127);
+  }
+  /// The exit status as waitpid() tells it.
+  int stop(int signal) const {
+    kill(child_, signal);
+    int status = 0;
+    EXPECT_EQ(waitpid(child_, &status, 0), child_);
+    return status;
+  }
+
+ private:
+  pid_t child_;
+};
+
+TEST_F(CommandLine, KilledAndInterruptedRendersGoOnToTheSameFile) {
+  // Enough for seconds on one thread; lines are kept from the first second on.
+  std::ofstream(folder_ / "g.json") << R"({"theta_i":[0,60],"theta_o":[0,10,20,30,40,50,60,70,80],"phi":[0,180]})";
+  const std::vector<std::string> words{
+      "render", "microfacet_diffuse", "--set",     "facet=callisto", "--grid", "g.json",
+      "--axis", "alpha=0.2,0.7",      "--samples", "500000",         "-o",     "t.exr"};
+  std::string render;
+  for (const std::string& word : words) render += (render.empty() ? "" : " ") + word;
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), words.begin(), words.end());
+    return more;
+  };
+  const auto kept = [&] {
+    std::error_code none;
+    const auto size = fs::file_size(folder_ / "t.exr.part", none);
+    return none ? 0 : size;
+  };
+  {
+    const Running run(folder_, with({"--threads", "1"}));
+    for (int i = 0; i < 6000 && kept() < 2500; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ASSERT_TRUE(WIFSIGNALED(run.stop(SIGKILL))) << "it should still have been at work";
+  }
+  ASSERT_GT(kept(), 0u);
+  EXPECT_FALSE(fs::exists(folder_ / "t.exr"));
+  fs::remove(folder_ / ".log");
+  EXPECT_EQ(run(render).code, 2);
+  EXPECT_EQ(files(), (std::vector<std::string>{"g.json", "t.exr.part"})) << "the killed program's probe is removed";
+  expect_refused(render, 2, {"t.exr.part", "--resume", "--force"});
+  expect_refused(render + " --seed 2 --resume", 2, {"t.exr.part", "seed is 1 there and 2 here"});
+  expect_refused(render + " --shard 1/2 --resume", 2, {"shard is 1/1 there and 1/2 here"});
+  {
+    const Running run(folder_, with({"--resume", "--threads", "1"}));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    const int status = run.stop(SIGINT);
+    ASSERT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 130);
+    const std::string message = content(folder_ / ".log");
+    EXPECT_NE(message.find("of 18 lines are kept (t.exr.part): the same command with --resume goes on"),
+              std::string::npos)
+        << message;
+    fs::remove(folder_ / ".log");
+  }
+  const Outcome resumed = run(render + " --resume");
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.err.find("went on from "), std::string::npos) << resumed.err;
+  EXPECT_EQ(files(), (std::vector<std::string>{"g.json", "t.exr"})) << "nothing is left behind";
+  const std::string bytes = content(folder_ / "t.exr");
+  ASSERT_EQ(run(render + " --force").code, 0);
+  EXPECT_EQ(bytes, content(folder_ / "t.exr"));
+
+  // Finished: nothing to do, so that loops over shards can be started again as they are.
+  const auto written = fs::last_write_time(folder_ / "t.exr");
+  const Outcome again = run(render + " --resume");
+  EXPECT_EQ(again.code, 0);
+  EXPECT_NE(again.err.find("finished already"), std::string::npos) << again.err;
+  EXPECT_EQ(fs::last_write_time(folder_ / "t.exr"), written);
+  expect_refused(render + " --seed 2 --resume", 2, {"t.exr", "seed is 1 there and 2 here", "--force"});
+  EXPECT_EQ(files(), (std::vector<std::string>{"g.json", "t.exr"}));
+}
+
+TEST_F(CommandLine, ShardsMergeToTheSameFile) {
+  const std::string render = "render microfacet_diffuse --grid small --samples 64 --axis alpha=0.2,0.7 ";
+  ASSERT_EQ(run(render + "-o whole.exr").code, 0);
+  for (const char* shard : {"1", "2", "3"}) {
+    const std::string name = std::string("s") + shard + ".exr";
+    ASSERT_EQ(run(render + "--shard " + shard + "/3 --resume -o " + name).code, 0);
+    EXPECT_EQ(json("table info " + name)["provenance"]["shard"], std::string(shard) + "/3");
+    EXPECT_EQ(json("table info " + name)["masked"], 2 * 810 * 2 / 3);
+  }
+  EXPECT_EQ(run("table merge s2.exr s3.exr s1.exr -o merged.exr").code, 0);
+  EXPECT_EQ(content(folder_ / "merged.exr"), content(folder_ / "whole.exr"));
+  EXPECT_EQ(json("table info merged.exr")["provenance"]["command"],
+            "lobefit render microfacet_diffuse --grid small --samples 64 --axis alpha=0.2,0.7");
+  expect_refused("table merge s2.exr s3.exr -o m.exr", 3, {"missing shard 1 of 3", "--partial"});
+  expect_refused("table merge s2.exr s3.exr s2.exr -o m.exr", 3, {"shard 2", "s2.exr"});
+  expect_refused("table merge s1.exr whole.exr -o m.exr", 3, {"whole.exr"});
+  expect_refused("table merge s1.exr s2.exr s3.exr -o merged.exr", 2, {"merged.exr", "--force"});
+  const Outcome partial = run("table merge s2.exr s3.exr --partial -o p.exr");
+  EXPECT_EQ(partial.code, 0);
+  EXPECT_NE(partial.err.find("shards 2,3/3 only"), std::string::npos) << partial.err;
+  ASSERT_EQ(run("table merge s1.exr p.exr --force -o merged.exr").code, 0);
+  EXPECT_EQ(content(folder_ / "merged.exr"), content(folder_ / "whole.exr"));
+  for (const char* text : {"0/3", "4/3", "a/b", "3", "1/0", "''"}) {
+    expect_refused(render + "-o bad.exr --shard " + text, 2, {"--shard", "I/N"});
+  }
+  expect_refused(render + "-o bad.exr --shard 1/19", 2, {"18 lines", "19 shards"});
+}
+
+TEST_F(CommandLine, RecolorGivesAnotherAlbedo) {
+  const std::string render = "render microfacet_diffuse --grid small --samples 64 --set bounces=all --orders ";
+  ASSERT_EQ(run(render + "-o white.exr").code, 0);
+  ASSERT_EQ(run(render + "--set albedo=0.8,0.4,0.2 -o direct.exr").code, 0);
+  ASSERT_EQ(run("table recolor white.exr --set albedo=0.8,0.4,0.2 -o colour.exr").code, 0);
+  EXPECT_EQ(run("table compare direct.exr colour.exr --tolerance 1e-6").code, 0);
+  const Json info = json("table info colour.exr");
+  EXPECT_EQ(info["provenance"]["params"]["albedo"], (Json{0.8, 0.4, 0.2}));
+  EXPECT_EQ(info["orders"], 24);
+  EXPECT_EQ(info["provenance"]["command"],
+            "lobefit render microfacet_diffuse --grid small --samples 64 --set bounces=all --orders && "
+            "lobefit table recolor white.exr --set albedo=0.8,0.4,0.2");
+  expect_refused("table recolor white.exr --set albedo=1.5 -o c.exr", 2, {"1.5", "from 0 to 1"});
+  expect_refused("table recolor white.exr --set alpha=0.5 -o c.exr", 2, {"alpha", "albedo"});
+  ASSERT_EQ(run("render microfacet_diffuse --grid small --samples 64 -o plain.exr").code, 0);
+  expect_refused("table recolor plain.exr --set albedo=0.5 -o c.exr", 2, {"plain.exr", "--orders"});
+}
+
 TEST_F(CommandLine, ThreadsDoNotChangeTheBits) {
   const std::string render = "render microfacet_diffuse --grid small --samples 512 --axis alpha=0.2,0.7 ";
   ASSERT_EQ(run(render + "--threads 1 -o one.exr").code, 0);

@@ -478,20 +478,24 @@ TEST(VisibleNormals, OfAFullHemisphereAreCosineWeighted) {
   }
 }
 
-TEST(VisibleNormals, BatchesAreTheSameRounded) {
-  constexpr std::size_t count = 203;
+TEST(VisibleNormals, BatchesAreTheSameInFloat) {
+  constexpr std::size_t count = 20011;
   const Direction w = from_degrees(70.0, 25.0);
-  std::vector<double> u(count), v(count);
+  std::vector<float> u(count), v(count);
   SamplePoints(Sampler::philox, {5, 0, 0}).fill(0, u, v);
   std::vector<float> x(count), y(count), z(count);
   for (const Distribution distribution : both_distributions) {
     sample_visible_normals(distribution, 0.3, w, u, v, {x, y, z});
+    double sum = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
       const Direction m = sample_visible_normal(distribution, 0.3, w, {u[i], v[i]});
-      ASSERT_EQ(x[i], static_cast<float>(m.x));
-      ASSERT_EQ(y[i], static_cast<float>(m.y));
-      ASSERT_EQ(z[i], static_cast<float>(m.z));
+      const Direction difference = Direction{x[i], y[i], z[i]} - m;
+      const double error = std::sqrt(dot(difference, difference));
+      // √(1 - p²) turns a rounding of 6e-8 at the rim of the disk into its root; elsewhere nothing is lost.
+      ASSERT_LT(error, 5e-4) << i;
+      sum += error;
     }
+    EXPECT_LT(sum / count, 2e-7);
   }
 }
 

@@ -280,5 +280,94 @@ TEST(SamplePoints, NestedScramblesConvergeAsTheyShould) {
   EXPECT_NEAR(philox_rate, 1.0, 0.2);
 }
 
+// ---- pairs, and the numbers of a path ---------------------------------------------------------------------------
+
+TEST(SamplePairs, EverySobolPairIsANetOfItsOwn) {
+  // Padded pairs take the points of an aligned block in another order: still one in every elementary interval.
+  for (const std::uint32_t number : {1u, 2u, 7u, 15u}) {
+    const SamplePoints points(Sampler::sobol, {3, 7, 1});
+    for (const std::uint32_t m : {1u, 4u, 8u}) {
+      const std::uint32_t count = 1u << m;
+      for (const std::uint32_t block : {0u, 5u, ~0u >> m}) {
+        for (std::uint32_t columns_log2 = 0; columns_log2 <= m; ++columns_log2) {
+          const double columns = std::ldexp(1.0, static_cast<int>(columns_log2));
+          const double rows = std::ldexp(1.0, static_cast<int>(m - columns_log2));
+          std::vector<int> hits(count, 0);
+          for (std::uint32_t i = 0; i < count; ++i) {
+            const auto [x, y] = points.pair(block * count + i, number);
+            ++hits[static_cast<std::size_t>(std::floor(x * columns) * rows + std::floor(y * rows))];
+          }
+          ASSERT_EQ(hits, std::vector<int>(count, 1)) << "pair " << number << ", 2^" << m << " points";
+        }
+      }
+    }
+  }
+}
+
+TEST(SamplePairs, AreIndependentOfOneAnother) {
+  // Over keys, and over the indices of one stream: Σ 12 (a - ½)(b - ½)/√n of numbers from two pairs is nearly standard
+  // normal. Over indices Sobol's sums may only be smaller, nets being evener than chance.
+  constexpr std::uint32_t n = 1u << 14;
+  const double bound = normal_bound(false_alarm);
+  for (const Sampler sampler : samplers) {
+    for (const auto& [first, second] : {std::pair{0u, 1u}, {1u, 2u}, {3u, 15u}, {15u, 16u}, {16u, 17u}, {2u, 40u}}) {
+      for (const bool over_keys : {true, false}) {
+        std::array<double, 4> sums{};
+        for (std::uint32_t k = 0; k < n; ++k) {
+          const SamplePoints points(sampler, {over_keys ? k : 8u, 17, 3});
+          const std::uint32_t index = over_keys ? 5 : k;
+          const auto a = points.pair(index, first), b = points.pair(index, second);
+          for (std::size_t d = 0; d < 4; ++d) sums[d] += 12.0 * (a[d / 2] - 0.5) * (b[d % 2] - 0.5);
+        }
+        for (const double sum : sums) {
+          EXPECT_LT(std::abs(sum) / std::sqrt(n), bound)
+              << name(sampler) << ", pairs " << first << " and " << second << (over_keys ? ", over keys" : "");
+        }
+      }
+    }
+  }
+}
+
+TEST(PathNumbers, AreThePairsInTheirOrder) {
+  for (const Sampler sampler : samplers) {
+    const SamplePoints points(sampler, {6, 5, 4});
+    PathNumbers numbers(points, 9);
+    EXPECT_EQ(numbers.next_pair(), points.pair(9, 0));
+    EXPECT_EQ(numbers.next(), points.pair(9, 1)[0]);
+    EXPECT_EQ(numbers.next(), points.pair(9, 1)[1]);
+    EXPECT_EQ(numbers.next(), points.pair(9, 2)[0]);
+    // A pair starts afresh; the spare number is dropped.
+    EXPECT_EQ(numbers.next_pair(), points.pair(9, 3));
+    EXPECT_EQ(numbers.next(), points.pair(9, 4)[0]);
+    for (std::uint32_t number = 5; number < 100; ++number) {
+      EXPECT_EQ(numbers.next_pair(), points.pair(9, number)) << number;
+    }
+  }
+}
+
+TEST(FloatPairs, AreTheCellsOfTheirDoubles) {
+  for (const Sampler sampler : samplers) {
+    const SamplePoints points(sampler, {42, 7, 3});
+    for (const std::uint32_t number : {0u, 1u, 2u, 15u, 16u, 40u, 32767u}) {
+      for (const std::size_t count : {0u, 1u, 15u, 16u, 17u, 100u}) {
+        std::vector<std::uint32_t> indices;
+        for (std::uint32_t i = 0; i < count; ++i) indices.push_back(i * 0x9E3779B9u);
+        // Longer than the indices: what lies beyond stays.
+        std::vector<float> u(count + 3, -1.0f), v(count + 3, -1.0f);
+        points.fill(number, indices, u, v);
+        for (std::size_t i = 0; i < count; ++i) {
+          const auto pair = points.pair(indices[i], number);
+          const auto cell = [](double x) { return static_cast<float>((std::floor(x * 0x1p23) + 0.5) * 0x1p-23); };
+          ASSERT_EQ(u[i], cell(pair[0])) << name(sampler) << ", pair " << number << ", index " << indices[i];
+          ASSERT_EQ(v[i], cell(pair[1])) << name(sampler) << ", pair " << number << ", index " << indices[i];
+          ASSERT_GT(u[i], 0.0f);
+          ASSERT_LT(u[i], 1.0f);
+        }
+        for (std::size_t i = count; i < count + 3; ++i) ASSERT_EQ(u[i], -1.0f);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lobefit

@@ -127,6 +127,9 @@ void expect_same(const Table& a, const Table& b) {
   EXPECT_EQ(a.seed, b.seed);
   EXPECT_EQ(a.samples, b.samples);
   EXPECT_EQ(a.shared_facets, b.shared_facets);
+  EXPECT_EQ(a.sampler, b.sampler);
+  EXPECT_EQ(a.stderr_target, b.stderr_target);
+  EXPECT_EQ(a.shards, b.shards);
   EXPECT_EQ(a.version, b.version);
   EXPECT_EQ(a.command, b.command);
   EXPECT_EQ(bits(a.values), bits(b.values));
@@ -748,7 +751,11 @@ TEST_F(TableFiles, BrokenAttributesAreRefused) {
                                                         {"seed", "1e3"},
                                                         {"seed", "99999999999999999999"},
                                                         {"samples", ""},
-                                                        {"samples", "many"}};
+                                                        {"samples", "many"},
+                                                        {"stderr_target", "small"},
+                                                        {"shard", "0/3"},
+                                                        {"shard", "1/2"},
+                                                        {"shard", ""}};
   for (const auto& [name, text] : broken) {
     Attributes attributes = good_attributes();
     attributes[name] = text;

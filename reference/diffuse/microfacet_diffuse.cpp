@@ -7,6 +7,7 @@
 
 #include "models/microfacet/fresnel.h"
 #include "reference/diffuse/facet_quadrature.h"
+#include "reference/diffuse/single_kernel.h"
 #include "reference/diffuse/smith_orders.h"
 #include "reference/diffuse/walk_lanes.h"
 #include "reference/visible_normals.h"
@@ -15,7 +16,8 @@ namespace lobefit {
 
 namespace {
 
-constexpr std::uint32_t block = 1024;  // paths that walk together
+constexpr std::uint32_t block = 1024;                 // paths that walk together
+constexpr std::uint32_t most_disk_points = 1u << 16;  // that are worth their memory
 
 /// Density cosine/π about m: the facet plus a point of the unit sphere.
 Direction sample_cosine(const Direction& m, const std::array<double, 2>& u) {
@@ -25,7 +27,8 @@ Direction sample_cosine(const Direction& m, const std::array<double, 2>& u) {
 
 /// Λ of a ray of direction w: of w itself where it rises, -1 - Λ(-w) where it falls.
 double ray_lambda(Distribution distribution, Alpha alpha, const Direction& w) {
-  if (w.z > 0.0) return smith_lambda(distribution, alpha, w);
+  // Beckmann's ends in -0 or less where its terms underflow; a ray so steep meets nothing.
+  if (w.z > 0.0) return std::max(0.0, smith_lambda(distribution, alpha, w));
   return -1.0 - smith_lambda(distribution, alpha, {w.x, w.y, std::max(-w.z, 1e-300)});
 }
 
@@ -176,11 +179,12 @@ void MicrofacetDiffuseSurface::sample_row(const Direction& wo, std::span<const D
   const bool lanes = fast && facet_.kind() == FacetKind::lambert;
   if (!lanes || (bounces_ > 1 && distribution_ != Distribution::ggx)) {
     sample_paths(view, lights, points, samples, sums);
+  } else if (n == 1 && bounces_ == 1 && distribution_ == Distribution::ggx && samples <= most_disk_points) {
+    sums[0] = samples * mean_visible_cosine(DiskPoints(points, samples), alpha_, seen, lights[0]);
   } else {
     LightLanes light_lanes(distribution_, alpha_, lights);
     WalkLanes walk(alpha_, points);
-    std::array<double, block> u, v;
-    std::array<float, block> mx, my, mz;
+    std::array<float, block> u, v, mx, my, mz;
     const double lambda_o = smith_lambda(distribution_, alpha_, view);
     for (std::uint32_t first = 0; first < samples; first += block) {
       const std::uint32_t count = std::min(block, samples - first);

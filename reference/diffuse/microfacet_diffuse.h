@@ -128,8 +128,8 @@ class MicrofacetDiffuseSurface : public Integrator {
   /// Interfaced facets have none to keep apart: their albedo is not a power of ρ.
   int orders() const override;
   bool has_exact() const override;
-  /// By quadrature (relative error estimate below 1e-11, of anisotropic and other than Lambertian facets 1e-9); all
-  /// bounces of Lambertian isotropic facets by SmithOrders, to about 1e-9 of f.
+  /// By quadrature (relative error estimate below 1e-11, of anisotropic and other than Lambertian facets 1e-8); all
+  /// bounces of Lambertian isotropic facets by SmithOrders, to 1e-9 of f up to 85 degrees and some 1e-8 beyond.
   void exact_row(const Direction& wo, std::span<const Direction> wi, const Line& line) const override;
   void sample_row(const Direction& wo, std::span<const Direction> wi, const SamplePoints& points, std::uint32_t samples,
                   bool fast, const Line& line) const override;

@@ -1,0 +1,2 @@
+#define LANES_NAMESPACE vector_lanes
+#include "bench/lanes.inc"

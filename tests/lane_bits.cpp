@@ -1,0 +1,2 @@
+#define LANE_BITS_FUNCTION shipped
+#include "tests/lane_bits.inc"
