@@ -137,7 +137,8 @@ void add_albedo(CLI::App& app, Context& context) {
       app.add_subcommand("albedo",
                          "Directional albedo: the integral of f times cosine over the other direction, by quadrature\n"
                          "(error: difference of the last two refinements) or, of references that have none, by Monte\n"
-                         "Carlo (standard error). Over both sides where light passes; of a fibre without cosine.\n"
+                         "Carlo (standard error). Over both sides where light passes (there --fixed light conserves\n"
+                         "energy: refraction compresses what a view sees); of a fibre without cosine.\n"
                          "  lobefit albedo eon --set roughness=1 --theta 0,45,80");
   struct Arguments {
     std::string name, theta, fixed = "view";

@@ -180,7 +180,8 @@ void MicrofacetDiffuseSurface::sample_row(const Direction& wo, std::span<const D
   if (!lanes || (bounces_ > 1 && distribution_ != Distribution::ggx)) {
     sample_paths(view, lights, points, samples, sums);
   } else if (n == 1 && bounces_ == 1 && distribution_ == Distribution::ggx && samples <= most_disk_points) {
-    sums[0] = samples * mean_visible_cosine(DiskPoints(points, samples), alpha_, seen, lights[0]);
+    sums[0] =
+        samples * weight(lights[0], view) * mean_visible_cosine(DiskPoints(points, samples), alpha_, seen, lights[0]);
   } else {
     LightLanes light_lanes(distribution_, alpha_, lights);
     WalkLanes walk(alpha_, points);
