@@ -41,8 +41,7 @@ LOBEFIT_TEXT void add_cosines(const Configuration& c, const float* __restrict p1
       const std::size_t i = first + j;
       const float p2 = (1.0f - c.s) * edge[i] + c.s * q[i];
       const float left = (edge[i] - p2) * (edge[i] + p2);
-      const float squared = left > 1e-30f ? left : 1e-30f;
-      const float p3 = squared * float_inverse_root(squared);
+      const float p3 = __builtin_sqrtf(left > 0.0f ? left : 0.0f);
       const float z = c.z2 * p2 + c.z3 * p3;
       float length2 = c.base + c.zz * (z * z);
       if constexpr (!isotropic) {

@@ -116,6 +116,19 @@ LOBEFIT_CLONES [[gnu::noinline]] void meet(std::size_t n, float alpha_x, float a
   }
 }
 
+/// Moves the lanes that are kept to the front: kept[k] ≥ k, so that no lane is overwritten before it has moved.
+LOBEFIT_CLONES [[gnu::noinline]] void compact(std::size_t n, const std::uint32_t* __restrict kept,
+                                              float* __restrict wx, float* __restrict wy, float* __restrict wz,
+                                              float* __restrict tau, std::uint32_t* __restrict index) {
+#pragma GCC ivdep
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::uint32_t i = kept[k];
+    const float x = wx[i], y = wy[i], z = wz[i], depth = tau[i];
+    const std::uint32_t number = index[i];
+    wx[k] = x, wy[k] = y, wz[k] = z, tau[k] = depth, index[k] = number;
+  }
+}
+
 /// Depth where a ray from above first meets a facet.
 LOBEFIT_CLONES [[gnu::noinline]] void enter(std::size_t n, float inverse_rate, const float* __restrict u,
                                             float* __restrict tau) {
@@ -188,6 +201,7 @@ void LightLanes::add(std::span<const float> mx, std::span<const float> my, std::
 void WalkLanes::resize(std::size_t n) {
   if (index_.size() >= n) return;
   index_.resize(n);
+  kept_.resize(n);
   for (std::vector<float>* array : {&mx_, &my_, &mz_, &wx_, &wy_, &wz_, &tau_, &spare_, &u_, &v_, &s_, &t_}) {
     array->resize(n);
   }
@@ -216,11 +230,11 @@ std::size_t WalkLanes::advance() {
   fly(count_, alpha_x, alpha_y, wx_.data(), wy_.data(), wz_.data(), v_.data(), tau_.data());
   std::size_t left = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    index_[left] = index_[i];
-    wx_[left] = wx_[i], wy_[left] = wy_[i], wz_[left] = wz_[i], tau_[left] = tau_[i];
+    kept_[left] = static_cast<std::uint32_t>(i);
     left += tau_[i] >= 0.0f ? 1 : 0;
   }
   count_ = left;
+  compact(count_, kept_.data(), wx_.data(), wy_.data(), wz_.data(), tau_.data(), index_.data());
   const std::span<const std::uint32_t> survivors = std::span(index_).first(count_);
   points_->fill(pair_++, survivors, s_, t_);
   meet(count_, alpha_x, alpha_y, wx_.data(), wy_.data(), wz_.data(), s_.data(), t_.data(), mx_.data(), my_.data(),

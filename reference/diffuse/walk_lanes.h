@@ -55,7 +55,7 @@ class WalkLanes {
   const SamplePoints* points_;
   std::size_t count_ = 0;
   std::uint32_t pair_ = 1;  // pair 0 chose the first facet
-  std::vector<std::uint32_t> index_;
+  std::vector<std::uint32_t> index_, kept_;
   std::vector<float> mx_, my_, mz_, wx_, wy_, wz_, tau_, spare_, u_, v_, s_, t_;
 };
 
