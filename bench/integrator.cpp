@@ -134,10 +134,11 @@ void register_integrator() {
   add("single/scalar/anisotropic", "", facet_count, [] { return scalar_lanes::mean_cosine(facet_count, false); });
   add("single/vector/anisotropic", "single/scalar/anisotropic", facet_count,
       [] { return vector_lanes::mean_cosine(facet_count, false); });
-  add("single/scalar/row_of_one", "", facet_count, [] { return scalar_lanes::facets_and_cosines(facet_count); });
-  add("single/vector/row_of_one", "single/scalar/row_of_one", facet_count,
-      [] { return vector_lanes::facets_and_cosines(facet_count); });
-  add("single/vector/once_against_row", "single/vector/row_of_one", facet_count,
+  add("single/scalar/points_made_each_time", "", facet_count,
+      [] { return scalar_lanes::points_and_cosines(facet_count); });
+  add("single/vector/points_made_each_time", "single/scalar/points_made_each_time", facet_count,
+      [] { return vector_lanes::points_and_cosines(facet_count); });
+  add("single/vector/once_against_row", "single/vector/points_made_each_time", facet_count,
       [] { return vector_lanes::mean_cosine(facet_count, true); });
 
   constexpr std::uint32_t many = 1 << 14;
