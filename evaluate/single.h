@@ -45,7 +45,11 @@ class Single {
   }
   LOBEFIT_TEXT friend Single sqrt(Single x) { return Single(__builtin_sqrtf(max(x, 0.0).value)); }
 
-  LOBEFIT_TEXT friend Single exp2(Single x) { return Single(float_exp2(x.value)); }
+  /// The clamp by masks: see select().
+  LOBEFIT_TEXT friend Single exp2(Single x) {
+    const Single clamped = select(x < -126.0, -126.0, select(x > 127.5, 127.5, x));
+    return Single(float_exp2_clamped(clamped.value));
+  }
   LOBEFIT_TEXT friend Single log2(Single x) { return Single(float_log2(max(x, smallest_base).value)); }
   LOBEFIT_TEXT friend Single log(Single x) { return log2(x) * std::numbers::ln2; }
   LOBEFIT_TEXT friend Single exp(Single x) { return exp2(x * std::numbers::log2e); }

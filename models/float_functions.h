@@ -11,9 +11,8 @@
 
 namespace lobefit {
 
-/// 2^x for x clamped to [-126, 127.5]: relative error below 2e-7.
-LOBEFIT_TEXT float float_exp2(float x) {
-  const float clamped = x < -126.0f ? -126.0f : (x > 127.5f ? 127.5f : x);
+/// 2^x for x in [-126, 127.5]: relative error below 2e-7.
+LOBEFIT_TEXT float float_exp2_clamped(float clamped) {
   // Round to nearest by truncating a positive number: every instruction set has that conversion.
   const std::int32_t whole = static_cast<std::int32_t>(clamped + 128.5f) - 128;
   const float f = clamped - static_cast<float>(whole);
@@ -30,6 +29,9 @@ LOBEFIT_TEXT float float_exp2(float x) {
   const std::int32_t half = whole >> 1;
   return p * std::bit_cast<float>((half + 127) << 23) * std::bit_cast<float>((whole - half + 127) << 23);
 }
+
+/// 2^x for x clamped to [-126, 127.5].
+LOBEFIT_TEXT float float_exp2(float x) { return float_exp2_clamped(x < -126.0f ? -126.0f : (x > 127.5f ? 127.5f : x)); }
 
 /// log2 of a positive normal number: relative error below 2.4e-7, also near 1.
 LOBEFIT_TEXT float float_log2(float x) {
