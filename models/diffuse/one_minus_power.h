@@ -17,7 +17,7 @@ struct OneMinusPower {
     // Up to here nine levels are exact to 1e-15, and beyond pow() is good to 5e-6 in float.
     const auto near_zero = max(exponent, 1.0) * x < 0.03;
     T series = T(1.0);
-    for (int k = 9; k >= 1; --k) series = 1.0 + (k - exponent) * (1.0 / (k + 1)) * x * series;
+    for (int k = 9; k >= 1; --k) series = 1.0 + (static_cast<double>(k) - exponent) * (1.0 / (k + 1)) * x * series;
     return select(near_zero, exponent * x * series, 1.0 - pow(1.0 - x, exponent));
   }
 };
