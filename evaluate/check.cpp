@@ -63,7 +63,8 @@ std::vector<ParameterValues> varied_parameters(const ParameterValues& values, co
       const ParameterInfo& info = set.info(vary[k]);
       const auto u = numbers(seed, sets.size() * 64 + k, 1);
       const double where = u[0] < 0.15 ? 0.0 : u[0] > 0.85 ? 1.0 : u[1];
-      set.set(info.name, info.lower + where * (info.upper - info.lower));
+      const double value = info.lower + where * (info.upper - info.lower);
+      set.set(info.name, info.choices.empty() ? value : std::round(value));
     }
     sets.push_back(std::move(set));
   }

@@ -27,6 +27,13 @@ struct Lambert {
   LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>&) {
     return p.albedo / pi;
   }
+
+  /// By the cosine of the light.
+  static Direction sample(const Parameters<double>&, const Direction&, const std::array<double, 2>& u) {
+    const double radius = std::sqrt(u[0]), azimuth = 2.0 * pi * u[1];
+    return {radius * std::cos(azimuth), radius * std::sin(azimuth), std::sqrt(1.0 - u[0])};
+  }
+  static double pdf(const Parameters<double>&, const Direction& wi, const Direction&) { return max(wi.z, 0.0) / pi; }
 };
 
 }  // namespace lobefit
