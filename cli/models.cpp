@@ -40,21 +40,39 @@ void print_parameters(const std::vector<ParameterInfo>& parameters) {
   }
 }
 
+/// Callisto's table of tiers (slide 98), for models that have more than one.
+void print_tiers(const std::vector<ParameterInfo>& parameters) {
+  constexpr std::array audiences{"for everyone", "for technical and material artists", "for fitting by machine"};
+  std::array<std::string, audiences.size()> names;
+  for (const ParameterInfo& info : parameters) {
+    std::string& list = names[static_cast<std::size_t>(info.tier)];
+    list += (list.empty() ? "" : ", ") + std::string(info.name);
+  }
+  if (std::ranges::count(names, "") > 1) return;
+  fmt::print("\n");
+  for (const Tier tier : {Tier::base, Tier::advanced, Tier::full}) {
+    const auto i = static_cast<std::size_t>(tier);
+    if (!names[i].empty()) fmt::print("  {:<9} {:<35} {}\n", tier_name(tier), audiences[i], names[i]);
+  }
+  fmt::print("  `lobefit fit --tier TIER` frees a tier and those before it.\n");
+}
+
 Json model_json(const Model& model) {
   const OperationCount operations = count_operations(find_float_model(model.info->name).trace());
   Json parameters = Json::array();
   for (const ParameterInfo& info : model.parameters) parameters.push_back(parameter_json(info));
   return {{"name", model.info->name},
-          {"kind", "brdf"},
+          {"kind", kind_name(model.info->kind)},
           {"title", model.info->title},
           {"doc", model.info->doc},
           {"params", parameters},
           {"source", model.info->source},
           {"properties",
            {{"reciprocal", model.info->reciprocal},
-            {"energy_conserving", model.info->energy_conserving},
+            {"energy_conserving", model.info->kind == ModelKind::term ? Json() : Json(model.info->energy_conserving)},
             {"isotropic", model.info->isotropic},
-            {"non_negative", model.info->non_negative}}},
+            {"non_negative", model.info->non_negative},
+            {"samplable", model.sample != nullptr}}},
           {"operations",
            {{"total", operations.total()},
             {"add_multiply", operations.add_multiply},
@@ -68,15 +86,35 @@ void print_model(const Model& model) {
   const ModelInfo& info = *model.info;
   const OperationCount operations = count_operations(find_float_model(info.name).trace());
   fmt::print("{}: {}\n  {}\n  Source: {}\n", info.name, info.title, info.doc, info.source);
-  fmt::print("  {}, {}, {}, {}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
-             info.energy_conserving ? "energy conserving" : "can reflect more than it receives",
-             info.isotropic ? "isotropic" : "anisotropic", info.non_negative ? "never negative" : "can be negative");
+  fmt::print("  {}, {}{}, {}{}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
+             info.kind == ModelKind::term ? ""
+             : info.energy_conserving     ? "energy conserving, "
+                                          : "can reflect more than it receives, ",
+             info.isotropic ? "isotropic" : "anisotropic", info.non_negative ? "never negative" : "can be negative",
+             model.sample ? ", has its own importance sampling" : "");
+  if (info.kind == ModelKind::term) fmt::print("  A term: evaluated at the half vector of wi and wo, one number.\n");
   fmt::print(
       "  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} "
       "compare/select)\n",
       operations.total(), operations.add_multiply, operations.divide, operations.square_root, operations.transcendental,
       operations.compare_select);
   print_parameters(model.parameters);
+  print_tiers(model.parameters);
+}
+
+/// All models of one kind, if there are any.
+void print_list(ModelKind kind, std::string_view heading) {
+  bool first = true;
+  for (const Model& model : models()) {
+    if (model.info->kind != kind) continue;
+    if (first) fmt::print("  {:<22} {:<67} {}\n", heading, "title", "parameters");
+    first = false;
+    std::string parameters;
+    for (const ParameterInfo& info : model.parameters)
+      parameters += (parameters.empty() ? "" : " ") + std::string(info.name);
+    fmt::print("  {:<22} {:<67} {}\n", model.info->name, model.info->title, parameters);
+  }
+  if (!first) fmt::print("\n");
 }
 
 }  // namespace
@@ -97,14 +135,10 @@ void add_models(CLI::App& app, Context& context) {
     } else if (!name->empty()) {
       print_model(find_model(*name));
     } else {
-      fmt::print("  {:<20} {:<52} {}\n", "model", "title", "parameters");
-      for (const Model& model : models()) {
-        std::string parameters;
-        for (const ParameterInfo& info : model.parameters)
-          parameters += (parameters.empty() ? "" : " ") + std::string(info.name);
-        fmt::print("  {:<20} {:<52} {}\n", model.info->name, model.info->title, parameters);
-      }
-      fmt::print("\n`lobefit models NAME` describes one.\n");
+      print_list(ModelKind::brdf, "model");
+      print_list(ModelKind::hair, "hair model");
+      print_list(ModelKind::term, "term");
+      fmt::print("`lobefit models NAME` describes one.\n");
     }
   });
 }

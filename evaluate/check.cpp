@@ -6,6 +6,7 @@
 #include <chrono>
 #include <numeric>
 
+#include "evaluate/conditioning.h"
 #include "reference/sample_points.h"
 
 namespace lobefit {
@@ -48,7 +49,7 @@ void set_pair(FloatPairs& pairs, std::size_t i, std::uint64_t seed) {
 /// Error sums of one block, added up in block order.
 struct BlockErrors {
   double squares = 0.0, relative_squares = 0.0, max_abs = 0.0, max_rel = 0.0, worst_excess = 0.0;
-  std::uint64_t relative_count = 0, failures = 0, non_finite = 0;
+  std::uint64_t relative_count = 0, conditioned = 0, failures = 0, non_finite = 0;
   std::size_t worst = 0;
 };
 
@@ -63,7 +64,8 @@ std::vector<ParameterValues> varied_parameters(const ParameterValues& values, co
       const ParameterInfo& info = set.info(vary[k]);
       const auto u = numbers(seed, sets.size() * 64 + k, 1);
       const double where = u[0] < 0.15 ? 0.0 : u[0] > 0.85 ? 1.0 : u[1];
-      set.set(info.name, info.lower + where * (info.upper - info.lower));
+      const double value = info.lower + where * (info.upper - info.lower);
+      set.set(info.name, info.choices.empty() ? value : std::round(value));
     }
     sets.push_back(std::move(set));
   }
@@ -106,8 +108,9 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
       const Rgb truth = model.evaluate(flat, pairs.wi(i), pairs.wo(i));
       const std::array<double, 3> expected{truth.x, truth.y, truth.z};
       const std::array<float, 3> found{values.r[i], values.g[i], values.b[i]};
-      const double cos_theta_i = pairs.wi(i).z;
+      const double cos_theta_i = std::abs(pairs.wi(i).z);
       bool failed = false;
+      std::optional<std::array<double, 3>> conditioning;
       for (std::size_t c = 0; c < 3; ++c) {
         if (!std::isfinite(found[c]) || !std::isfinite(expected[c])) {
           ++e.non_finite;
@@ -117,8 +120,12 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
           continue;
         }
         const double error = std::abs(found[c] - expected[c]);
-        const double excess =
-            error / (options.relative_bound * std::abs(expected[c]) + options.absolute_bound / cos_theta_i);
+        double bound = options.relative_bound * std::abs(expected[c]) + options.absolute_bound / cos_theta_i;
+        if (error > bound) {
+          if (!conditioning) conditioning = float_conditioning(model, flat, pairs.wi(i), pairs.wo(i));
+          bound += (*conditioning)[c];
+        }
+        const double excess = error / bound;
         e.squares += error * error;
         e.max_abs = max(e.max_abs, error);
         if (std::abs(expected[c]) >= smallest_relative_value) {
@@ -135,6 +142,7 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
         }
       }
       e.failures += failed ? 1 : 0;
+      e.conditioned += conditioning && !failed ? 1 : 0;
     }
     monitor.advance(1);
   });
@@ -149,6 +157,7 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
     total.squares += e.squares;
     total.relative_squares += e.relative_squares;
     total.relative_count += e.relative_count;
+    total.conditioned += e.conditioned;
     total.failures += e.failures;
     total.non_finite += e.non_finite;
     total.max_abs = max(total.max_abs, e.max_abs);
@@ -169,6 +178,7 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
     std::nth_element(relative.begin(), rank, relative.end());
     result.p999_rel = *rank;
   }
+  result.conditioned = total.conditioned;
   result.failures = total.failures;
   result.non_finite = total.non_finite;
   result.worst_wi = pairs.wi(total.worst);
@@ -215,6 +225,7 @@ Json CheckResult::json() const {
                 {"p999_rel", p999_rel},
                 {"rms", rms},
                 {"rms_rel", rms_rel},
+                {"conditioned", conditioned},
                 {"failures", failures},
                 {"non_finite", non_finite},
                 {"worst",

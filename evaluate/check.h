@@ -16,9 +16,9 @@ namespace lobefit {
 struct CheckOptions {
   std::uint64_t pairs = 1u << 20;
   std::uint64_t seed = 1;
-  /// A pair passes if |float - double| ≤ relative_bound |double| + absolute_bound / cos theta_i. The absolute term
-  /// bounds what reaches the eye, f cos theta_i: forms with a term in 1/cos theta_i, such as Proxima's, multiply the
-  /// rounding of everything else by it.
+  /// A pair passes if |float - double| ≤ relative_bound |double| + absolute_bound / |cos theta_i|, or by no more than
+  /// its float_conditioning() beyond that. The absolute term bounds what reaches the eye, f cos theta_i: forms with a
+  /// term in 1/cos theta_i, such as Proxima's, multiply the rounding of everything else by it.
   double relative_bound = 1e-5, absolute_bound = 1e-6;
 };
 
@@ -35,6 +35,8 @@ struct CheckResult {
   std::string model;
   std::uint64_t pairs = 0;
   double max_abs = 0.0, max_rel = 0.0, p999_rel = 0.0, rms = 0.0, rms_rel = 0.0;
+  /// Of the pairs, how many pass by their conditioning alone.
+  std::uint64_t conditioned = 0;
   std::uint64_t failures = 0, non_finite = 0;
   Direction worst_wi, worst_wo;
   ParameterValues worst_parameters;

@@ -41,7 +41,7 @@ bool is_non_negative(const ShaderNode* node) {
 
 }  // namespace
 
-Trace::Trace() {
+Trace::Trace(std::string_view inlined) : inlined_(inlined) {
   if (current_trace) throw std::logic_error("a Trace is active in this thread already");
   current_trace = this;
 }

@@ -71,7 +71,8 @@ struct Shader {
 /// Collects what Expressions do while it lives; one at a time in a thread.
 class Trace {
  public:
-  Trace();
+  /// A call of the function `inlined` is traced in place: a term is its own function.
+  explicit Trace(std::string_view inlined = "");
   ~Trace();
   Trace(const Trace&) = delete;
   Trace& operator=(const Trace&) = delete;
@@ -85,8 +86,10 @@ class Trace {
   bool has_function(std::string_view name, const std::vector<ShaderType>& types) const;
   void add_function(ShaderFunction function) { shader_.functions.push_back(std::move(function)); }
   Shader finish(ShaderFunction brdf);
+  std::string_view inlined() const { return inlined_; }
 
  private:
+  std::string_view inlined_;
   Shader shader_;
 };
 
@@ -193,6 +196,7 @@ struct TracedCall {
   static auto trace(const A&... arguments) {
     Trace& tracer = Trace::current();
     using R = decltype(F::evaluate(placeholder<A>("")...));
+    if (tracer.inlined() == F::name) return R(F::evaluate(traced::Common<A>(traced::Operand(arguments).node)...));
     const std::vector<ShaderType> types{traced::type_of<A>...};
     if (!tracer.has_function(F::name, types)) {
       static_assert(sizeof...(A) == std::tuple_size_v<std::remove_cvref_t<decltype(F::arguments)>>);

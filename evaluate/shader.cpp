@@ -191,8 +191,10 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
   std::string text = "// " + std::string(model.title) + ".\n// Source: " + std::string(model.source) + ".\n";
   for (const std::string& line : provenance) text += "// " + line + "\n";
   text +=
-      "// wi: to the light, wo: to the viewer; unit vectors of the tangent frame, z the normal.\n"
-      "// Returns the BRDF in 1/sr, without cosine.\n\n"
+      "// wi: to the light, wo: to the viewer; unit vectors of the tangent frame, z the normal.\n" +
+      std::string(model.kind == ModelKind::term ? "// Returns the term at their half vector, the same in all channels."
+                                                : "// Returns the BRDF in 1/sr, without cosine.") +
+      "\n\n"
       "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265\n#endif\n\n";
 
   text += "struct " + name + "_Parameters {\n";
@@ -202,6 +204,8 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
             std::string(info.doc) + " Range " + number_text(info.lower) + " to " + number_text(info.upper) +
             (info.unit.empty() ? "" : " " + std::string(info.unit)) + ".\n";
   }
+  // GLSL has no empty structs.
+  if (parameters.empty()) text += "    float unused;\n";
   text += "};\n\n";
 
   for (const ShaderFunction& function : shader.functions) {
@@ -227,6 +231,7 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
     text += "    p." + std::string(parameter.info.name) + " = " + value + ";" +
             (parameter.comment.empty() ? "" : "  // " + parameter.comment) + "\n";
   }
+  if (parameters.empty()) text += "    p.unused = 0.0;\n";
   text += "    return p;\n}\n";
   return text;
 }

@@ -29,7 +29,7 @@ std::string print_shader(const Shader& shader, std::string_view language, const 
 /// Traces evaluate_brdf<M> on wi, wo and the members of a parameter struct p.
 template <class M>
 Shader trace_shader() {
-  Trace trace;
+  Trace trace(M::info.name);
   const auto input = [&](const std::string& name, ShaderType type) {
     return trace.node(Operation::input, type, {}, name);
   };

@@ -293,7 +293,7 @@ std::vector<std::string> free_parameters(const ParameterValues& values, const Ta
   const TableModel on_table(find_model(values.owner()), values, table, mappings);
   std::vector<std::string> names;
   for (const ParameterInfo& info : values.list()) {
-    if (info.tier <= tier && !on_table.set_by_axis(static_cast<std::size_t>(info.offset)))
+    if (info.choices.empty() && info.tier <= tier && !on_table.set_by_axis(static_cast<std::size_t>(info.offset)))
       names.emplace_back(info.name);
   }
   return names;

@@ -69,7 +69,7 @@ struct Fit {
 Fit fit(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
         Monitor& monitor);
 
-/// Parameters of these tiers that no axis of the table sets.
+/// Parameters of these tiers that no axis of the table sets and that are numbers, not choices.
 std::vector<std::string> free_parameters(const ParameterValues& values, const Table& table,
                                          const std::vector<AxisMapping>& mappings, Tier tier);
 

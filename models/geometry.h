@@ -15,14 +15,19 @@ struct Geometry {
   G cos_theta_i, cos_theta_o;  // N·L, N·V
   G sin_theta_i, sin_theta_o;
   G cos_theta_h;     // N·H
-  G cos_theta_d;     // L·H = V·H
+  G sin2_theta_h;    // 1 - (N·H)², from the tangential components: sharp lobes need it where N·H rounds to 1
+  G cos_theta_d;     // L·H = V·H = |wi + wo|/2: no cancellation where light and view graze from opposite sides
+  G sin2_theta_d;    // 1 - (L·H)² = |wi - wo|²/4: small differences from 1 survive in float
   G cos_light_view;  // L·V = -cos theta_k
   G tangential_dot;  // L·V - (N·L)(N·V), from the tangential components: no cancellation near the normal
 };
 
 template <class G>
 LOBEFIT_TEXT Geometry<G> make_geometry(const Vec3<G>& wi, const Vec3<G>& wo) {
-  const Vec3<G> h = let("h", normalize(wi + wo));
+  // Not const: GCC 12 leaves a const object that an inlined function fills in memory, where no loop vectorises.
+  Vec3<G> sum = let("sum", wi + wo);
+  Vec3<G> difference = let("difference", wi - wo);
+  Vec3<G> h = let("h", normalize(sum));
   return {.wi = wi,
           .wo = wo,
           .h = h,
@@ -31,9 +36,17 @@ LOBEFIT_TEXT Geometry<G> make_geometry(const Vec3<G>& wi, const Vec3<G>& wo) {
           .sin_theta_i = let("sin_theta_i", sqrt(wi.x * wi.x + wi.y * wi.y)),
           .sin_theta_o = let("sin_theta_o", sqrt(wo.x * wo.x + wo.y * wo.y)),
           .cos_theta_h = let("cos_theta_h", h.z),
-          .cos_theta_d = let("cos_theta_d", dot(wi, h)),
+          .sin2_theta_h = let("sin2_theta_h", h.x * h.x + h.y * h.y),
+          .cos_theta_d = let("cos_theta_d", 0.5 * sqrt(dot(sum, sum))),
+          .sin2_theta_d = let("sin2_theta_d", 0.25 * dot(difference, difference)),
           .cos_light_view = let("cos_light_view", dot(wi, wo)),
           .tangential_dot = let("tangential_dot", wi.x * wo.x + wi.y * wo.y)};
+}
+
+/// 1 - cos θ without its cancellation next to θ = 0, which falloffs with exponents below 1 would blow up in float.
+template <class G>
+LOBEFIT_TEXT G one_minus_cosine(const G& sin2, const G& cosine) {
+  return sin2 / (1.0 + cosine);
 }
 
 /// Unit direction at polar angle theta and azimuth phi, both in radians.

@@ -1,6 +1,7 @@
 // All models by name, in double precision.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -18,6 +19,10 @@ struct Model {
   /// The same over n pairs.
   void (*evaluate_all)(std::span<const double> flat, std::span<const Direction> wi, std::span<const Direction> wo,
                        std::span<Rgb> values);
+  /// A direction to the light for a viewer at wo, from u in [0, 1)²: with density pdf() per solid angle. Null where a
+  /// model has no sampling of its own. Directions below the horizon come out too; nothing is reflected there.
+  Direction (*sample)(std::span<const double> flat, const Direction& wo, const std::array<double, 2>& u) = nullptr;
+  double (*pdf)(std::span<const double> flat, const Direction& wi, const Direction& wo) = nullptr;
 
   ParameterValues defaults() const { return ParameterValues(parameters, std::string(info->name)); }
 };

@@ -381,8 +381,12 @@ TEST_F(CommandLine, ModelsDescribeThemselves) {
       EXPECT_TRUE(model.contains(key)) << model;
     for (const Json& parameter : model["params"]) {
       EXPECT_FALSE(parameter["doc"].get<std::string>().empty()) << parameter;
-      EXPECT_LE(parameter["range"][0], parameter["default"]) << parameter;
-      EXPECT_LE(parameter["default"], parameter["range"][1]) << parameter;
+      if (parameter.contains("choices")) {
+        EXPECT_NE(std::ranges::find(parameter["choices"], parameter["default"]), parameter["choices"].end());
+      } else {
+        EXPECT_LE(parameter["range"][0], parameter["default"]) << parameter;
+        EXPECT_LE(parameter["default"], parameter["range"][1]) << parameter;
+      }
     }
   }
   for (const char* verb : {"models", "eval", "albedo", "references", "reference", "render", "table", "fit", "refit",

@@ -328,12 +328,12 @@ TEST(Shader, OperationsOfProximaCountedByHand) {
 }
 
 TEST(Shader, CalledFunctionsCountAtEveryCall) {
-  // Burley over Lambert: two calls of 1 + (f90 - 1) pow5(1 - x), each 4 + 3; f90 4 and its dot 5; wi + wo 3 and its
-  // normalisation; one product of the two factors and three with the albedo.
+  // Burley over Lambert: two calls of 1 + (f90 - 1) pow5(1 - x), each 4 + 3; f90 4; V·H = |wi + wo|/2, 3 + 5 + 1 and a
+  // root; one product of the two factors and three with the albedo.
   const OperationCount burley = count_operations(find_float_model("burley").trace());
-  EXPECT_EQ(burley.add_multiply, 2 * 7 + 4 + 5 + 3 + 8 + 1 + 3);
+  EXPECT_EQ(burley.add_multiply, 2 * 7 + 4 + 3 + 5 + 1 + 1 + 3);
   EXPECT_EQ(burley.square_root, 1);
-  EXPECT_EQ(burley.divide, 3 + 1);
+  EXPECT_EQ(burley.divide, 3);
 }
 
 class ShaderOfModel : public ::testing::TestWithParam<std::tuple<std::string, std::string>> {

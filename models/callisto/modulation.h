@@ -7,13 +7,16 @@ namespace lobefit {
 
 /// h(θ, n, φ, m) = (1 - cos⁺θ)^(5n) (cos⁺φ)^(5m) with n, m already remapped by r(x) = 2 (1 - x), as an exponent of 10
 /// (1 - x). Source: Jimenez et al. 2023, The Character Rendering Art of The Callisto Protocol, slides 67-98.
+///
+/// Takes 1 - cos θ as it is: exponents below 1 make much of its rounding.
 struct CallistoFalloff {
   static constexpr const char* name = "callisto_falloff";
-  static constexpr std::array arguments{"cos_theta", "falloff", "cos_phi", "tangent_falloff"};
+  static constexpr std::array arguments{"one_minus_cos_theta", "falloff", "cos_phi", "tangent_falloff"};
 
   template <class G, class T>
-  LOBEFIT_TEXT static auto evaluate(const G& cos_theta, const T& falloff, const G& cos_phi, const T& tangent_falloff) {
-    return pow(1.0 - saturate(cos_theta), 10.0 * (1.0 - falloff)) *
+  LOBEFIT_TEXT static auto evaluate(const G& one_minus_cos_theta, const T& falloff, const G& cos_phi,
+                                    const T& tangent_falloff) {
+    return pow(saturate(one_minus_cos_theta), 10.0 * (1.0 - falloff)) *
            pow(saturate(cos_phi), 10.0 * (1.0 - tangent_falloff));
   }
 };
@@ -59,14 +62,27 @@ constexpr void describe_callisto_modulation(P& p, Visit&& visit) {
                                                          .doc = "How far retroreflection reaches in theta_d."});
 }
 
-/// c1 = lerp(1, ρ_f, α_f) lerp(1, ρ_r, α_r), with the slides' angles: θ_d and θ_h.
+/// A cosine, and 1 less it.
+template <class G>
+struct CosinePair {
+  G cosine, one_minus_cosine;
+};
+
+/// c1 = lerp(1, ρ_f, α_f) lerp(1, ρ_r, α_r), α_f = h(d, h), α_r = h(h, d). The slides' angles d and h are θ_d and θ_h.
+/// ρ_f and ρ_r are `fresnel_color` and `retro_color`, intensities or intensities times tints.
+template <class T, class G, class Color>
+LOBEFIT_TEXT auto callisto_modulation(const CallistoModulation<T>& p, const CosinePair<G>& d, const CosinePair<G>& h,
+                                      const Color& fresnel_color, const Color& retro_color) {
+  const auto fresnel = let("fresnel", call<CallistoFalloff>(d.one_minus_cosine, p.diffuse_fresnel_falloff, h.cosine,
+                                                            p.diffuse_fresnel_tangent_falloff));
+  const auto retro = let("retro", call<CallistoFalloff>(h.one_minus_cosine, p.retroreflection_falloff, d.cosine,
+                                                        p.retroreflection_tangent_falloff));
+  return (1.0 + (fresnel_color - 1.0) * fresnel) * (1.0 + (retro_color - 1.0) * retro);
+}
 template <class T, class G>
 LOBEFIT_TEXT auto callisto_modulation(const CallistoModulation<T>& p, const G& cos_theta_d, const G& cos_theta_h) {
-  const auto fresnel = let("fresnel", call<CallistoFalloff>(cos_theta_d, p.diffuse_fresnel_falloff, cos_theta_h,
-                                                            p.diffuse_fresnel_tangent_falloff));
-  const auto retro = let("retro", call<CallistoFalloff>(cos_theta_h, p.retroreflection_falloff, cos_theta_d,
-                                                        p.retroreflection_tangent_falloff));
-  return (1.0 + (p.diffuse_fresnel - 1.0) * fresnel) * (1.0 + (p.retroreflection - 1.0) * retro);
+  return callisto_modulation(p, CosinePair<G>{cos_theta_d, 1.0 - cos_theta_d},
+                             CosinePair<G>{cos_theta_h, 1.0 - cos_theta_h}, p.diffuse_fresnel, p.retroreflection);
 }
 
 }  // namespace lobefit

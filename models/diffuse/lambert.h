@@ -2,6 +2,7 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -27,6 +28,11 @@ struct Lambert {
   LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>&) {
     return p.albedo / pi;
   }
+
+  static Direction sample(const Parameters<double>&, const Direction&, const std::array<double, 2>& u) {
+    return sample_cosine(u);
+  }
+  static double pdf(const Parameters<double>&, const Direction& wi, const Direction&) { return cosine_density(wi); }
 };
 
 }  // namespace lobefit

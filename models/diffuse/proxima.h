@@ -18,12 +18,25 @@ struct ProximaParameters {
   T a, b, exponent;
 };
 
+/// `fade` is 1 - (max(-V·L, 0))^e.
+template <class T, class C, class F, class G>
+LOBEFIT_TEXT T proxima_factor(const T& alpha, const C& a, const C& b, const F& fade, const Geometry<G>& g) {
+  return 1.0 + alpha * let("slope", a + b / max(g.cos_theta_i, smallest_base)) * fade;
+}
 template <class T, class G>
 LOBEFIT_TEXT T proxima_factor(const ProximaParameters<T>& p, const Geometry<G>& g) {
   const G cos_theta_k = let("cos_theta_k", saturate(-g.cos_light_view));
   const T fade = let("fade", 1.0 - pow(cos_theta_k, p.exponent));
-  const T slope = let("slope", p.a + p.b / max(g.cos_theta_i, smallest_base));
-  return 1.0 + p.alpha * slope * fade;
+  return proxima_factor(p.alpha, p.a, p.b, fade, g);
+}
+
+/// As the slides print it, and the shader clamps it.
+inline constexpr double proxima_published_a = -0.55, proxima_published_b = 0.19;
+template <class T, class G>
+LOBEFIT_TEXT T published_proxima_factor(const T& alpha, const Geometry<G>& g) {
+  const G cos_theta_k = let("cos_theta_k", saturate(-g.cos_light_view));
+  const G fade = let("fade", 1.0 - sqrt(cos_theta_k));
+  return max(proxima_factor(alpha, proxima_published_a, proxima_published_b, fade, g), 0.0);
 }
 
 template <class P, class Visit>
@@ -33,13 +46,13 @@ constexpr void describe_proxima(P& p, Visit&& visit) {
   visit(p.a, ParameterInfo{.name = "a",
                            .lower = -2.0,
                            .upper = 2.0,
-                           .initial = -0.55,
+                           .initial = proxima_published_a,
                            .tier = Tier::full,
                            .doc = "Constant part of the roughness term."});
   visit(p.b, ParameterInfo{.name = "b",
                            .lower = -2.0,
                            .upper = 2.0,
-                           .initial = 0.19,
+                           .initial = proxima_published_b,
                            .tier = Tier::full,
                            .doc = "Part of the roughness term that grows as 1/cos theta_i."});
   // Below 0.2 the guarded pow(0, e) would no longer vanish.

@@ -131,16 +131,16 @@ struct CallistoFresnel {
   static constexpr const char* title = "Callisto's Fresnel term";
   static constexpr const char* source = "Jimenez et al. 2023, The Character Rendering Art of The Callisto Protocol";
   static constexpr const char* doc = "Schlick with a falloff: constant, Schlick and 1 at n_s = 0, 1/2 and 1.";
-  static constexpr std::array arguments{"cosine", "f0", "falloff"};
+  static constexpr std::array arguments{"one_minus_cosine", "f0", "falloff"};
 
   template <class T, class F, class N>
-  LOBEFIT_TEXT static constexpr auto evaluate(const T& cosine, const F& f0, const N& falloff) {
+  LOBEFIT_TEXT static constexpr auto evaluate(const T& one_minus_cosine, const F& f0, const N& falloff) {
     // 2 - r = 2 n_s
-    return f0 + (1.0 - f0) * (saturate(2.0 * falloff) * pow(1.0 - saturate(cosine), 10.0 * (1.0 - falloff)));
+    return f0 + (1.0 - f0) * (saturate(2.0 * falloff) * pow(one_minus_cosine, 10.0 * (1.0 - falloff)));
   }
   template <class G, class F0, class F1>
   LOBEFIT_TEXT static constexpr auto at(const Geometry<G>& g, const F0& f0, const F1& falloff) {
-    return call<CallistoFresnel>(g.cos_theta_d, f0, falloff);
+    return call<CallistoFresnel>(one_minus_cosine(g.sin2_theta_d, g.cos_theta_d), f0, falloff);
   }
 };
 

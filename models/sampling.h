@@ -1,0 +1,27 @@
+// What sampling is made of beside facets (models/microfacet/sampling.h): the cosine, and lobes in shares.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "models/geometry.h"
+
+namespace lobefit {
+
+/// By the cosine with z: density cos θ/π.
+inline Direction sample_cosine(const std::array<double, 2>& u) {
+  const double radius = std::sqrt(u[0]), azimuth = 2.0 * pi * u[1];
+  return {radius * std::cos(azimuth), radius * std::sin(azimuth), std::sqrt(1.0 - u[0])};
+}
+inline double cosine_density(const Direction& w) { return max(w.z, 0.0) / pi; }
+
+/// Picks a lobe by its share (shares add up to 1), and stretches u[0] over [0, 1) again for that lobe.
+template <std::size_t n>
+std::size_t pick_lobe(const std::array<double, n>& shares, std::array<double, 2>& u) {
+  std::size_t lobe = 0;
+  while (lobe + 1 < n && u[0] >= shares[lobe]) u[0] -= shares[lobe++];
+  u[0] = min(u[0] / max(shares[lobe], smallest_base), 1.0 - 0x1p-53);
+  return lobe;
+}
+
+}  // namespace lobefit
