@@ -1,6 +1,7 @@
 // The models as a GPU runs them: float batches over structure-of-arrays directions, and shaders.
 #pragma once
 
+#include <deque>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -39,7 +40,10 @@ struct FloatModel {
   Shader (*trace)();
 };
 
-std::span<const FloatModel> float_models();
+/// In the order of models().
+const std::deque<FloatModel>& float_models();
+/// Beside add_model(), for the same name.
+void add_float_model(const FloatModel& model);
 /// Throws Error(usage) for an unknown name.
 const FloatModel& find_float_model(std::string_view name);
 

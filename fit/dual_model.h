@@ -21,7 +21,9 @@ struct DualModel {
                    double* derivatives);
 };
 
-/// The room's model of the same name.
+/// Beside add_model(), for the same name.
+void add_dual_model(const DualModel& model);
+/// The room's model of the same name. Throws Error(usage) if it has none.
 const DualModel& dual_model(const Model& model);
 
 }  // namespace lobefit

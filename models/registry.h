@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -27,8 +28,11 @@ struct Model {
   ParameterValues defaults() const { return ParameterValues(parameters, std::string(info->name)); }
 };
 
-/// Every registered model, in the order of list.def.
-std::span<const Model> models();
+/// Every registered model: those of list.def in its order, then what add_model() added. References stay valid.
+const std::deque<Model>& models();
+/// Registers a model that is not in list.def (make_model() makes one). Before other threads use the registry. Throws
+/// Error(usage) if the name is taken.
+void add_model(const Model& model);
 /// Throws Error(usage) with the nearest name.
 const Model& find_model(std::string_view name);
 

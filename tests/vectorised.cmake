@@ -3,7 +3,7 @@
 # match FILES such loops start on; 1 in the batches of models if not given.
 if(NOT DEFINED LOOPS)
   set(LOOPS 1)
-  set(FILES "float_model/[A-Za-z0-9]+\\.cpp")
+  set(FILES "evaluate/make_float_model\\.h")
 endif()
 execute_process(
   COMMAND ${COMPILER} -std=c++20 -O3 -ffp-contract=off -fno-math-errno -fno-trapping-math -I${INCLUDE}
