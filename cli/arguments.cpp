@@ -156,7 +156,7 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
   const Model& model = find_model(name);
   ParameterValues values = model.defaults();
   set_parameters(values, settings);
-  return {name, 3, false,
+  return {name, 3, model.info->transmits,
           [&model, values](const Direction& wi, const Direction& wo) { return model.evaluate(values.flat(), wi, wo); },
           parameters_json(values)};
 }

@@ -72,6 +72,7 @@ Json model_json(const Model& model) {
             {"energy_conserving", model.info->kind == ModelKind::term ? Json() : Json(model.info->energy_conserving)},
             {"isotropic", model.info->isotropic},
             {"non_negative", model.info->non_negative},
+            {"transmits", model.info->transmits},
             {"samplable", model.sample != nullptr}}},
           {"operations",
            {{"total", operations.total()},
@@ -86,11 +87,12 @@ void print_model(const Model& model) {
   const ModelInfo& info = *model.info;
   const OperationCount operations = count_operations(find_float_model(info.name).trace());
   fmt::print("{}: {}\n  {}\n  Source: {}\n", info.name, info.title, info.doc, info.source);
-  fmt::print("  {}, {}{}, {}{}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
+  fmt::print("  {}, {}{}, {}{}{}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
              info.kind == ModelKind::term ? ""
              : info.energy_conserving     ? "energy conserving, "
                                           : "can reflect more than it receives, ",
              info.isotropic ? "isotropic" : "anisotropic", info.non_negative ? "never negative" : "can be negative",
+             info.transmits ? ", for light from behind too" : "",
              model.sample ? ", has its own importance sampling" : "");
   if (info.kind == ModelKind::term) fmt::print("  A term: evaluated at the half vector of wi and wo, one number.\n");
   fmt::print(

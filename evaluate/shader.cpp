@@ -194,6 +194,7 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
       "// wi: to the light, wo: to the viewer; unit vectors of the tangent frame, z the normal.\n" +
       std::string(model.kind == ModelKind::term ? "// Returns the term at their half vector, the same in all channels."
                                                 : "// Returns the BRDF in 1/sr, without cosine.") +
+      (model.transmits ? "\n// Multiply it by |N.L|: light from behind comes through." : "") +
       "\n\n"
       "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265\n#endif\n\n";
 

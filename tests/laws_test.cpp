@@ -56,6 +56,17 @@ std::vector<std::vector<double>> parameter_sets(const std::vector<ParameterInfo>
   return sets;
 }
 
+/// The pairs, and for a model that transmits each of them again with its light behind the surface.
+std::vector<DirectionPair> with_light_behind(const ModelInfo& info, std::vector<DirectionPair> pairs) {
+  if (!info.transmits) return pairs;
+  const std::size_t count = pairs.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto [wi, wo] = pairs[i];
+    pairs.push_back({{wi.x, wi.y, -wi.z}, wo});
+  }
+  return pairs;
+}
+
 /// Runs its tests on one model, found by name.
 class Laws : public ::testing::TestWithParam<std::string> {
  protected:
@@ -78,6 +89,7 @@ TEST_P(Laws, SignIsAsClaimed) {
   std::vector<DirectionPair> pairs = random_pairs(1000, 1);
   const std::vector<DirectionPair> hostile = hostile_pairs();
   pairs.insert(pairs.end(), hostile.begin(), hostile.end());
+  pairs = with_light_behind(info_, pairs);
   FloatPairs float_pairs(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) float_pairs.set(i, pairs[i].wi, pairs[i].wo);
   FloatRgb values(pairs.size());
@@ -113,6 +125,7 @@ TEST_P(Laws, NothingIsReflectedBelowTheHorizon) {
     const double sine = std::sqrt((1.0 - cosine) * (1.0 + cosine));
     for (const Direction& below : {Direction{sine, 0.0, cosine}, Direction{-sine, 0.0, cosine}}) {
       for (const auto& [wi, wo] : {DirectionPair{below, above}, {above, below}, {below, below}}) {
+        if (info_.transmits && wo.z > 0.0) continue;
         for (const double value : channels(model_.evaluate(flat, wi, wo))) EXPECT_EQ(value, 0.0) << where(flat, wi, wo);
       }
     }
@@ -133,7 +146,7 @@ TEST_P(Laws, TermsAreGrey) {
 }
 
 TEST_P(Laws, ValuesAreFiniteOnHostileDirections) {
-  const std::vector<DirectionPair> pairs = hostile_pairs();
+  const std::vector<DirectionPair> pairs = with_light_behind(info_, hostile_pairs());
   FloatPairs float_pairs(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) float_pairs.set(i, pairs[i].wi, pairs[i].wo);
   FloatRgb values(pairs.size());
@@ -196,7 +209,8 @@ TEST_P(Laws, IsotropyIsAsClaimed) {
   }
 }
 
-/// ∫ f cos θ_i dω_i for a view at elevation `cosine_o`, the largest of the three channels.
+/// ∫ f |cos θ_i| dω_i for a view at elevation `cosine_o`, the largest of the three channels. Over both hemispheres if
+/// the model transmits.
 double directional_albedo(const Model& model, std::span<const double> flat, double cosine_o) {
   constexpr int azimuths = 64;
   const Direction wo{std::sqrt((1.0 - cosine_o) * (1.0 + cosine_o)), 0.0, cosine_o};
@@ -207,19 +221,21 @@ double directional_albedo(const Model& model, std::span<const double> flat, doub
     for (int i = 0; i < steps * steps; ++i) {
       const std::array<double, 2> u{(i / steps + 0.5) / steps, (i % steps + 0.5) / steps};
       const Direction wi = model.sample(flat, wo, u);
-      if (wi.z <= 0.0) continue;
-      albedo = albedo + model.evaluate(flat, wi, wo) * (wi.z / (model.pdf(flat, wi, wo) * steps * steps));
+      if (wi.z <= 0.0 && !model.info->transmits) continue;
+      albedo = albedo + model.evaluate(flat, wi, wo) * (std::abs(wi.z) / (model.pdf(flat, wi, wo) * steps * steps));
     }
     return largest(albedo);
   }
   // Cut where light and view are equally high: min and max of the two angles have a kink there.
-  for (const auto& [lower, upper] : {std::pair{0.0, cosine_o}, std::pair{cosine_o, 1.0}}) {
+  std::vector<std::pair<double, double>> intervals{{0.0, cosine_o}, {cosine_o, 1.0}};
+  if (model.info->transmits) intervals.emplace_back(-1.0, 0.0);
+  for (const auto& [lower, upper] : intervals) {
     for (const auto& [cosine, weight] : gauss_legendre(16, lower, upper)) {
       const double sine = std::sqrt((1.0 - cosine) * (1.0 + cosine));
       for (int k = 0; k < azimuths; ++k) {
         const double azimuth = 2.0 * pi * (k + 0.5) / azimuths;
         const Direction wi{sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
-        albedo = albedo + model.evaluate(flat, wi, wo) * (cosine * weight * 2.0 * pi / azimuths);
+        albedo = albedo + model.evaluate(flat, wi, wo) * (std::abs(cosine) * weight * 2.0 * pi / azimuths);
       }
     }
   }
@@ -262,9 +278,9 @@ TEST_P(Laws, BatchesEqualSingleEvaluations) {
 }
 
 TEST_P(Laws, FloatStaysNearDouble) {
-  constexpr std::size_t random_count = 1 << 16;
-  std::vector<DirectionPair> pairs = random_pairs(random_count, 5);
-  const std::vector<DirectionPair> hostile = hostile_pairs();
+  std::vector<DirectionPair> pairs = with_light_behind(info_, random_pairs(1 << 16, 5));
+  const std::size_t random_count = pairs.size();
+  const std::vector<DirectionPair> hostile = with_light_behind(info_, hostile_pairs());
   pairs.insert(pairs.end(), hostile.begin(), hostile.end());
   const std::size_t count = pairs.size();
   FloatPairs float_pairs(count);
@@ -338,6 +354,7 @@ TYPED_TEST(TextLaws, EveryInstructionSetGivesTheSameBits) {
   std::vector<DirectionPair> pairs = random_pairs(count, 9);
   const std::vector<DirectionPair> hostile = hostile_pairs();
   pairs.insert(pairs.end(), hostile.begin(), hostile.end());
+  pairs = with_light_behind(TypeParam::info, pairs);
   FloatPairs float_pairs(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) float_pairs.set(i, pairs[i].wi, pairs[i].wo);
   FloatRgb values(pairs.size());
@@ -366,7 +383,7 @@ TYPED_TEST(TextLaws, GradientsAreFiniteOnHostileDirections) {
         slots[k] = Dual<width>::variable(flat[k], static_cast<int>(k - first));
       }
       const auto p = unflatten<TypeParam, Dual<width>>(std::span<const Dual<width>>(slots));
-      for (const auto& [wi, wo] : hostile_pairs()) {
+      for (const auto& [wi, wo] : with_light_behind(TypeParam::info, hostile_pairs())) {
         const Vec3<Dual<width>> value = evaluate_brdf<TypeParam>(p, wi, wo);
         for (const Dual<width>& channel : {value.x, value.y, value.z}) {
           ASSERT_TRUE(std::isfinite(channel.value)) << where(flat, wi, wo);

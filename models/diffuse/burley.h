@@ -16,6 +16,19 @@ struct SchlickScale {
   }
 };
 
+/// π f/ρ of Burley's diffuse: ½ at grazing angles when smooth, more than 1 towards the light when rough.
+struct BurleyFactor {
+  static constexpr const char* name = "burley_factor";
+  static constexpr std::array arguments{"cos_theta_i", "cos_theta_o", "cos_theta_d", "roughness"};
+
+  template <class G, class T>
+  LOBEFIT_TEXT static auto evaluate(const G& cos_theta_i, const G& cos_theta_o, const G& cos_theta_d,
+                                    const T& roughness) {
+    const auto f90 = let("f90", 0.5 + 2.0 * roughness * square(cos_theta_d));
+    return call<SchlickScale>(f90, cos_theta_i) * call<SchlickScale>(f90, cos_theta_o);
+  }
+};
+
 struct Burley {
   static constexpr ModelInfo info{
       .name = "burley",
@@ -39,8 +52,7 @@ struct Burley {
 
   template <class T, class G>
   LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>& g) {
-    const T f90 = let("f90", 0.5 + 2.0 * p.roughness * square(g.cos_theta_d));
-    return p.albedo / pi * (call<SchlickScale>(f90, g.cos_theta_i) * call<SchlickScale>(f90, g.cos_theta_o));
+    return p.albedo / pi * call<BurleyFactor>(g.cos_theta_i, g.cos_theta_o, g.cos_theta_d, p.roughness);
   }
 };
 

@@ -5,6 +5,23 @@
 
 namespace lobefit {
 
+/// π f/ρ of it.
+struct DisneySubsurfaceFactor {
+  static constexpr const char* name = "disney_subsurface_factor";
+  static constexpr std::array arguments{"cos_theta_i", "cos_theta_o", "cos_theta_d", "roughness"};
+
+  template <class G, class T>
+  LOBEFIT_TEXT static auto evaluate(const G& cos_theta_i, const G& cos_theta_o, const G& cos_theta_d,
+                                    const T& roughness) {
+    // L·H, as in disney.brdf (Fss90 = LdotH*LdotH*roughness). Transcriptions with N·H exist; with it Fss90 would no
+    // longer be Burley's retro-reflective part ("used to flatten retroreflection based on roughness").
+    const auto f90 = let("f90", roughness * square(cos_theta_d));
+    const auto schlick = let("schlick", call<SchlickScale>(f90, cos_theta_i) * call<SchlickScale>(f90, cos_theta_o));
+    const auto lommel_seeliger = let("lommel_seeliger", 1.0 / max(cos_theta_i + cos_theta_o, smallest_base));
+    return 1.25 * (schlick * (lommel_seeliger - 0.5) + 0.5);
+  }
+};
+
 struct DisneySubsurface {
   static constexpr ModelInfo info{
       .name = "disney_subsurface",
@@ -31,12 +48,7 @@ struct DisneySubsurface {
 
   template <class T, class G>
   LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>& g) {
-    // L·H, as in disney.brdf (Fss90 = LdotH*LdotH*roughness). Transcriptions with N·H exist; with it Fss90 would no
-    // longer be Burley's retro-reflective part ("used to flatten retroreflection based on roughness").
-    const T f90 = let("f90", p.roughness * square(g.cos_theta_d));
-    const T schlick = let("schlick", call<SchlickScale>(f90, g.cos_theta_i) * call<SchlickScale>(f90, g.cos_theta_o));
-    const G lommel_seeliger = let("lommel_seeliger", 1.0 / max(g.cos_theta_i + g.cos_theta_o, smallest_base));
-    return p.albedo / pi * (1.25 * (schlick * (lommel_seeliger - 0.5) + 0.5));
+    return p.albedo / pi * call<DisneySubsurfaceFactor>(g.cos_theta_i, g.cos_theta_o, g.cos_theta_d, p.roughness);
   }
 };
 
