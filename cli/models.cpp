@@ -80,7 +80,8 @@ Json model_json(const Model& model) {
             {"divide", operations.divide},
             {"square_root", operations.square_root},
             {"transcendental", operations.transcendental},
-            {"compare_select", operations.compare_select}}}};
+            {"compare_select", operations.compare_select},
+            {"table_read", operations.table_read}}}};
 }
 
 void print_model(const Model& model) {
@@ -97,9 +98,10 @@ void print_model(const Model& model) {
   if (info.kind == ModelKind::term) fmt::print("  A term: evaluated at the half vector of wi and wo, one number.\n");
   fmt::print(
       "  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} "
-      "compare/select)\n",
+      "compare/select{})\n",
       operations.total(), operations.add_multiply, operations.divide, operations.square_root, operations.transcendental,
-      operations.compare_select);
+      operations.compare_select,
+      operations.table_read > 0 ? fmt::format(", {} table read", operations.table_read) : "");
   print_parameters(model.parameters);
   print_tiers(model.parameters);
 }

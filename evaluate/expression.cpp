@@ -76,6 +76,12 @@ bool Trace::has_function(std::string_view name, const std::vector<ShaderType>& t
   return true;
 }
 
+void Trace::add_table(std::string_view name, std::span<const float> entries) {
+  if (std::ranges::find(shader_.tables, name, &ShaderTable::name) == shader_.tables.end()) {
+    shader_.tables.push_back({std::string(name), entries});
+  }
+}
+
 Shader Trace::finish(ShaderFunction brdf) {
   shader_.brdf = std::move(brdf);
   return std::move(shader_);
@@ -112,6 +118,7 @@ Expression operator>=(Expression a, Expression b) { return compare(Operation::gr
 Expression min(Expression a, Expression b) { return function("min", {a, b}); }
 Expression max(Expression a, Expression b) { return function("max", {a, b}); }
 Expression abs(Expression x) { return function("abs", {x}); }
+Expression floor(Expression x) { return function("floor", {x}); }
 Expression saturate(Expression x) { return function("saturate", {x}); }
 Expression select(Expression condition, Expression a, Expression b) {
   return Expression(Trace::current().node(Operation::select, ShaderType::scalar, {condition.node, a.node, b.node}));
@@ -176,6 +183,7 @@ OperationCount count_operations(const Shader& shader) {
     total.square_root += part.square_root;
     total.transcendental += part.transcendental;
     total.compare_select += part.compare_select;
+    total.table_read += part.table_read;
   };
   const auto count = [&](const ShaderFunction& function) {
     OperationCount total;
@@ -200,6 +208,7 @@ OperationCount count_operations(const Shader& shader) {
         case Operation::less_equal:
         case Operation::greater_equal:
         case Operation::select: total.compare_select += width; break;
+        case Operation::entry: total.table_read += 1; break;
         case Operation::call: add(total, counts.at(node->name)); break;
         case Operation::intrinsic:
           if (node->name == "dot")
@@ -218,7 +227,7 @@ OperationCount count_operations(const Shader& shader) {
           } else if (node->name == "exp" || node->name == "exp2" || node->name == "log" || node->name == "log2")
             total.transcendental += width;
           else
-            total.compare_select += width;  // min max abs saturate
+            total.compare_select += width;  // min max abs floor saturate
           break;
       }
     };

@@ -9,11 +9,13 @@
 
 #include <array>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "models/arc_cosine.h"
+#include "models/lookup.h"
 #include "models/scalar.h"
 
 namespace lobefit {
@@ -36,8 +38,9 @@ enum class Operation {
   less_equal,
   greater_equal,
   select,     // operands[0] ? operands[1] : operands[2]
-  intrinsic,  // name: min max abs saturate lerp sqrt exp exp2 log log2 pow dot normalize
+  intrinsic,  // name: min max abs floor saturate lerp sqrt exp exp2 log log2 pow dot normalize
   call,       // name: a traced function
+  entry,      // name: a table; operands[0] is the entry's number
 };
 
 struct ShaderNode {
@@ -61,9 +64,16 @@ struct ShaderFunction {
   const ShaderNode* result = nullptr;
 };
 
-/// A traced model: its BRDF as a graph, and the functions that it calls, callees first.
+/// A constant array of the printed shader.
+struct ShaderTable {
+  std::string name;
+  std::span<const float> entries;
+};
+
+/// A traced model: its BRDF as a graph, the functions that it calls, callees first, and the tables that they read.
 struct Shader {
   std::vector<std::unique_ptr<const ShaderNode>> nodes;
+  std::vector<ShaderTable> tables;
   std::vector<ShaderFunction> functions;
   ShaderFunction brdf;
 };
@@ -85,6 +95,8 @@ class Trace {
   /// Throws std::logic_error if the function is known with other argument types: a shader has one text per function.
   bool has_function(std::string_view name, const std::vector<ShaderType>& types) const;
   void add_function(ShaderFunction function) { shader_.functions.push_back(std::move(function)); }
+  /// Once for each table.
+  void add_table(std::string_view name, std::span<const float> entries);
   Shader finish(ShaderFunction brdf);
   std::string_view inlined() const { return inlined_; }
 
@@ -113,6 +125,7 @@ class Expression {
   friend Expression min(Expression a, Expression b);
   friend Expression max(Expression a, Expression b);
   friend Expression abs(Expression x);
+  friend Expression floor(Expression x);
   friend Expression select(Expression condition, Expression a, Expression b);
   friend Expression sqrt(Expression x);
   friend Expression exp(Expression x);
@@ -217,6 +230,15 @@ struct TracedCall {
   }
 };
 
+template <class Table>
+struct TracedEntry {
+  static Expression trace(Expression index) {
+    Trace& tracer = Trace::current();
+    tracer.add_table(Table::name, Table::entries);
+    return Expression(tracer.node(Operation::entry, ShaderType::scalar, {index.node}, Table::name));
+  }
+};
+
 inline Expression pow5(Expression x) { return call<Pow5>(x); }
 inline Expression acos(Expression x) { return call<ArcCosine>(x); }
 
@@ -226,9 +248,10 @@ struct OperationCount {
   int divide = 0;
   int square_root = 0;
   int transcendental = 0;
-  int compare_select = 0;  // min, max, abs, saturate, comparisons, select
+  int compare_select = 0;  // min, max, abs, floor, saturate, comparisons, select
+  int table_read = 0;
 
-  int total() const { return add_multiply + divide + square_root + transcendental + compare_select; }
+  int total() const { return add_multiply + divide + square_root + transcendental + compare_select + table_read; }
 };
 OperationCount count_operations(const Shader& shader);
 

@@ -15,9 +15,11 @@ struct Language {
   std::string_view vector;  // type of three floats
   std::string_view lerp;
   bool has_saturate;
+  bool has_initializer_lists;
 };
 
-constexpr std::array languages{Language{"hlsl", "float3", "lerp", true}, Language{"glsl", "vec3", "mix", false}};
+constexpr std::array languages{Language{"hlsl", "float3", "lerp", true, true},
+                               Language{"glsl", "vec3", "mix", false, false}};
 
 const Language& find_language(std::string_view name) {
   std::string known;
@@ -46,11 +48,25 @@ std::string upper_case(std::string text) {
 /// Names that a local must not take: the parameter struct's, and words that either language reserves or defines.
 const std::set<std::string>& reserved_names() {
   static const std::set<std::string> names{
-      "p",      "half",   "double",  "sample", "smooth", "flat",   "shared", "input",  "output", "common",  "partition",
-      "active", "filter", "texture", "point",  "line",   "linear", "matrix", "vector", "min",    "max",     "abs",
-      "clamp",  "lerp",   "mix",     "sqrt",   "exp",    "exp2",   "log",    "log2",   "pow",    "dot",     "normalize",
-      "cross",  "length", "step",    "fract",  "sign",   "mod",    "out",    "in",     "inout",  "discard", "saturate"};
+      "p",      "half",      "double", "sample", "smooth",  "flat",  "shared",    "input",   "output",
+      "common", "partition", "active", "filter", "texture", "point", "line",      "linear",  "matrix",
+      "vector", "min",       "max",    "abs",    "floor",   "clamp", "lerp",      "mix",     "sqrt",
+      "exp",    "exp2",      "log",    "log2",   "pow",     "dot",   "normalize", "cross",   "length",
+      "step",   "fract",     "sign",   "mod",    "out",     "in",    "inout",     "discard", "saturate"};
   return names;
+}
+
+/// A constant array, eight entries a line.
+std::string table_text(const Language& language, const ShaderTable& table) {
+  const std::string guard = "LOBEFIT_TABLE_" + upper_case(table.name);
+  const std::string type = "float[" + std::to_string(table.entries.size()) + "]";
+  std::string text = "#ifndef " + guard + "\n#define " + guard + "\n";
+  text += (language.has_initializer_lists ? "static const float " : "const float ") + ("Lobefit_" + table.name) +
+          "_entries" + type.substr(5) + " = " + (language.has_initializer_lists ? "{" : type + "(");
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    text += (i == 0 ? "" : ",") + std::string(i % 8 == 0 ? "\n    " : " ") + literal_text(table.entries[i]);
+  }
+  return text + (language.has_initializer_lists ? "\n};\n#endif\n\n" : "\n);\n#endif\n\n");
 }
 
 /// Binding strength, so that parentheses stand just where the graph needs them.
@@ -154,6 +170,7 @@ class FunctionPrinter {
         return outer > ternary ? "(" + inner + ")" : inner;
       }
       case Operation::call: return "Lobefit_" + node.name + "(" + list(node) + ")";
+      case Operation::entry: return "Lobefit_" + node.name + "_entries[int(" + text(*node.operands[0], ternary) + ")]";
       case Operation::intrinsic:
         if (node.name == "saturate" && !language_.has_saturate) return "clamp(" + list(node) + ", 0.0, 1.0)";
         return (node.name == "lerp" ? std::string(language_.lerp) : node.name) + "(" + list(node) + ")";
@@ -209,6 +226,7 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
   if (parameters.empty()) text += "    float unused;\n";
   text += "};\n\n";
 
+  for (const ShaderTable& table : shader.tables) text += table_text(language, table);
   for (const ShaderFunction& function : shader.functions) {
     const std::string guard = "LOBEFIT_FUNCTION_" + upper_case(function.name);
     std::string arguments;

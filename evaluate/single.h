@@ -43,6 +43,9 @@ class Single {
   LOBEFIT_TEXT friend constexpr Single abs(Single x) {
     return Single(std::bit_cast<float>(std::bit_cast<std::uint32_t>(x.value) & 0x7fffffffu));
   }
+  /// Both for x ≥ 0.
+  LOBEFIT_TEXT friend Single floor(Single x) { return Single(static_cast<float>(to_index(x))); }
+  LOBEFIT_TEXT friend std::int32_t to_index(Single x) { return static_cast<std::int32_t>(x.value); }
   LOBEFIT_TEXT friend Single sqrt(Single x) { return Single(__builtin_sqrtf(max(x, 0.0).value)); }
 
   /// The clamp by masks: see select().

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "models/scalar.h"
 
@@ -72,6 +73,9 @@ class Dual {
   LOBEFIT_TEXT friend Dual max(const Dual& a, const Dual& b) { return a.value > b.value ? a : b; }
   LOBEFIT_TEXT friend Dual abs(const Dual& a) { return a.value < 0.0 ? -a : a; }
   LOBEFIT_TEXT friend Dual select(bool condition, const Dual& a, const Dual& b) { return condition ? a : b; }
+
+  LOBEFIT_TEXT friend Dual floor(const Dual& a) { return std::floor(a.value); }
+  LOBEFIT_TEXT friend std::int32_t to_index(const Dual& a) { return static_cast<std::int32_t>(a.value); }
 
   LOBEFIT_TEXT friend Dual sqrt(const Dual& a) {
     const double root = lobefit::sqrt(a.value);

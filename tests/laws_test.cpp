@@ -216,13 +216,14 @@ double directional_albedo(const Model& model, std::span<const double> flat, doub
   const Direction wo{std::sqrt((1.0 - cosine_o) * (1.0 + cosine_o)), 0.0, cosine_o};
   Rgb albedo{};
   if (model.sample) {
-    // Narrow lobes fall between fixed directions.
-    constexpr int steps = 48;
-    for (int i = 0; i < steps * steps; ++i) {
-      const std::array<double, 2> u{(i / steps + 0.5) / steps, (i % steps + 0.5) / steps};
+    // Narrow lobes fall between fixed directions. A Fibonacci lattice: a grid's rows would not hit the shares of lobes
+    // that are picked by the first number.
+    constexpr int count = 2584, generator = 1597;
+    for (int i = 0; i < count; ++i) {
+      const std::array<double, 2> u{(i + 0.5) / count, (i * generator % count + 0.5) / count};
       const Direction wi = model.sample(flat, wo, u);
       if (wi.z <= 0.0 && !model.info->transmits) continue;
-      albedo = albedo + model.evaluate(flat, wi, wo) * (std::abs(wi.z) / (model.pdf(flat, wi, wo) * steps * steps));
+      albedo = albedo + model.evaluate(flat, wi, wo) * (std::abs(wi.z) / (model.pdf(flat, wi, wo) * count));
     }
     return largest(albedo);
   }

@@ -37,6 +37,7 @@ inline ShaderValue run_intrinsic(std::string_view name, const std::vector<Shader
   };
   if (name == "min") return two([](double a, double b) { return a < b ? a : b; });
   if (name == "max") return two([](double a, double b) { return a > b ? a : b; });
+  if (name == "floor") return one([](double a) { return std::floor(a); });
   if (name == "abs") return one([](double a) { return std::fabs(a); });
   if (name == "sqrt") return one([](double a) { return std::sqrt(a); });
   if (name == "exp") return one([](double a) { return std::exp(a); });
@@ -104,6 +105,14 @@ class GraphInterpreter {
       case Operation::greater_equal: return {x[0][0] >= x[1][0] ? 1.0 : 0.0};
       case Operation::select: return x[0][0] != 0.0 ? x[1] : x[2];
       case Operation::intrinsic: return run_intrinsic(node.name, x);
+      case Operation::entry: {
+        const auto table = std::find_if(shader_.tables.begin(), shader_.tables.end(),
+                                        [&](const ShaderTable& t) { return t.name == node.name; });
+        if (table == shader_.tables.end()) throw std::runtime_error("no table " + node.name);
+        const auto index = static_cast<std::size_t>(x[0].at(0));
+        if (index >= table->entries.size()) throw std::runtime_error("read beyond " + node.name);
+        return {table->entries[index]};
+      }
       case Operation::call: {
         const auto function = std::find_if(shader_.functions.begin(), shader_.functions.end(),
                                            [&](const ShaderFunction& f) { return f.name == node.name; });
@@ -130,6 +139,11 @@ class TextInterpreter {
       if (accept("struct")) {
         while (!accept("}")) ++at_;
         expect(";");
+        continue;
+      }
+      accept("static");
+      if (accept("const")) {
+        read_table();
         continue;
       }
       ++at_;  // the result's type
@@ -166,6 +180,25 @@ class TextInterpreter {
     std::vector<std::string> arguments;
     std::size_t begin = 0;
   };
+
+  /// float name[size] = {…}; or = float[size](…);
+  void read_table() {
+    expect("float");
+    ShaderValue& entries = tables_[next()];
+    expect("[");
+    const std::size_t size = std::stoul(next());
+    expect("]");
+    expect("=");
+    if (accept("float")) at_ += 3;
+    ++at_;  // { or (
+    do {
+      const double sign = accept("-") ? -1.0 : 1.0;
+      entries.push_back(sign * std::stod(next()));
+    } while (accept(","));
+    ++at_;  // } or )
+    expect(";");
+    if (entries.size() != size) throw std::runtime_error("a table's size");
+  }
 
   void split(std::string_view text) {
     for (std::size_t i = 0; i < text.size();) {
@@ -302,6 +335,12 @@ class TextInterpreter {
       return {value};
     }
     if (token == "LOBEFIT_PI") return {pi};
+    if (tables_.contains(token)) {
+      for (const char* part : {"[", "int", "("}) expect(part);
+      const auto index = static_cast<std::size_t>(ternary(variables).at(0));
+      for (const char* part : {")", "]"}) expect(part);
+      return {tables_.at(token).at(index)};
+    }
     if (accept("(")) {
       std::vector<ShaderValue> arguments;
       while (!accept(")")) {
@@ -322,6 +361,7 @@ class TextInterpreter {
   std::vector<std::string> tokens_;
   std::size_t at_ = 0;
   std::map<std::string, Function> functions_;
+  std::map<std::string, ShaderValue> tables_;
 };
 
 }  // namespace lobefit

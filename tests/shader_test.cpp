@@ -259,6 +259,34 @@ TEST(ShaderText, CalleesComeFirstAndOnce) {
   EXPECT_LT(text.find("float Lobefit_schlick_scale("), text.find("float3 Lobefit_burley("));
 }
 
+struct TinyTable {
+  static constexpr const char* name = "tiny";
+  static constexpr int columns = 2;
+  static constexpr std::array<float, 4> entries{-1.0f, 0.5f, 2.0f, 1e-7f};
+};
+
+TEST(ShaderText, TablesAreConstantArrays) {
+  Trace trace;
+  const V v(trace.node(Operation::input, ShaderType::vector, {}, "wi"));
+  const E result = lookup<TinyTable>(v.x) + lookup<TinyTable>(v.y);
+  const Shader shader = trace.finish({"test", {}, result.node});
+  const std::string hlsl = print_shader(shader, "hlsl", {.name = "test"}, {}, {});
+  const std::string array =
+      "#ifndef LOBEFIT_TABLE_TINY\n"
+      "#define LOBEFIT_TABLE_TINY\n"
+      "static const float Lobefit_tiny_entries[4] = {\n"
+      "    -1.0, 0.5, 2.0, 1e-07\n"
+      "};\n"
+      "#endif\n";
+  EXPECT_EQ(occurrences(hlsl, array), 1u) << hlsl;
+  EXPECT_EQ(occurrences(hlsl, "Lobefit_tiny_entries[int(column + 1.0)]"), 1u) << hlsl;
+  const std::string glsl = print_shader(shader, "glsl", {.name = "test"}, {}, {});
+  EXPECT_NE(glsl.find("\nconst float Lobefit_tiny_entries[4] = float[4](\n    -1.0, 0.5, 2.0, 1e-07\n);\n"),
+            std::string::npos)
+      << glsl;
+  EXPECT_EQ(count_operations(shader).table_read, 8);
+}
+
 TEST(Trace, IsOneAtATime) {
   EXPECT_THROW(Expression(1.0), std::logic_error);
   const Trace trace;
