@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "models/scalar.h"
 
@@ -31,6 +32,8 @@ class LibmFloat {
   LOBEFIT_TEXT friend LibmFloat abs(LibmFloat x) { return LibmFloat(std::abs(x.value)); }
   LOBEFIT_TEXT friend LibmFloat select(bool condition, LibmFloat a, LibmFloat b) { return condition ? a : b; }
 
+  LOBEFIT_TEXT friend LibmFloat floor(LibmFloat x) { return LibmFloat(std::floor(x.value)); }
+  LOBEFIT_TEXT friend std::int32_t to_index(LibmFloat x) { return static_cast<std::int32_t>(x.value); }
   LOBEFIT_TEXT friend LibmFloat sqrt(LibmFloat x) { return LibmFloat(std::sqrt(max(x, 0.0).value)); }
   LOBEFIT_TEXT friend LibmFloat exp(LibmFloat x) { return LibmFloat(std::exp(x.value)); }
   LOBEFIT_TEXT friend LibmFloat exp2(LibmFloat x) { return LibmFloat(std::exp2(x.value)); }

@@ -139,9 +139,13 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
     ParameterValues values = reference->defaults();
     set_parameters(values, settings);
     const std::shared_ptr<const Integrator> integrator = reference->make(values);
-    return {name, integrator->channels(), reference->sphere,
+    return {name,
+            integrator->channels(),
+            reference->sphere,
             [integrator](const Direction& wi, const Direction& wo) { return integrator->exact(wi, wo); },
-            parameters_json(values), integrator, reference->fibre};
+            parameters_json(values),
+            integrator,
+            reference->fibre};
   }
   if (is_file(name)) {
     const auto table = std::make_shared<Table>(Table::read(name));
@@ -156,9 +160,14 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
   const Model& model = find_model(name);
   ParameterValues values = model.defaults();
   set_parameters(values, settings);
-  return {name, 3, model.info->transmits,
+  const bool hair = is_hair(model.info->kind);
+  return {name,
+          3,
+          hair || model.info->transmits,
           [&model, values](const Direction& wi, const Direction& wo) { return model.evaluate(values.flat(), wi, wo); },
-          parameters_json(values)};
+          parameters_json(values),
+          nullptr,
+          hair};
 }
 
 ModelChoice find_model_or_fit(const std::string& name, const std::vector<std::string>& settings) {

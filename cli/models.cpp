@@ -69,10 +69,11 @@ Json model_json(const Model& model) {
           {"source", model.info->source},
           {"properties",
            {{"reciprocal", model.info->reciprocal},
-            {"energy_conserving", model.info->kind == ModelKind::term ? Json() : Json(model.info->energy_conserving)},
+            {"energy_conserving", is_term(model.info->kind) ? Json() : Json(model.info->energy_conserving)},
             {"isotropic", model.info->isotropic},
             {"non_negative", model.info->non_negative},
             {"transmits", model.info->transmits},
+            {"fibre", is_hair(model.info->kind)},
             {"samplable", model.sample != nullptr}}},
           {"operations",
            {{"total", operations.total()},
@@ -89,13 +90,14 @@ void print_model(const Model& model) {
   const OperationCount operations = count_operations(find_float_model(info.name).trace());
   fmt::print("{}: {}\n  {}\n  Source: {}\n", info.name, info.title, info.doc, info.source);
   fmt::print("  {}, {}{}, {}{}{}\n", info.reciprocal ? "reciprocal" : "not reciprocal",
-             info.kind == ModelKind::term ? ""
-             : info.energy_conserving     ? "energy conserving, "
-                                          : "can reflect more than it receives, ",
+             is_term(info.kind)       ? ""
+             : info.energy_conserving ? "energy conserving, "
+                                      : "can reflect more than it receives, ",
              info.isotropic ? "isotropic" : "anisotropic", info.non_negative ? "never negative" : "can be negative",
              info.transmits ? ", for light from behind too" : "",
              model.sample ? ", has its own importance sampling" : "");
   if (info.kind == ModelKind::term) fmt::print("  A term: evaluated at the half vector of wi and wo, one number.\n");
+  if (info.kind == ModelKind::hair_term) fmt::print("  A term of hair: z is the fibre's axis; one number.\n");
   fmt::print(
       "  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} "
       "compare/select{})\n",
@@ -142,6 +144,7 @@ void add_models(CLI::App& app, Context& context) {
       print_list(ModelKind::brdf, "model");
       print_list(ModelKind::hair, "hair model");
       print_list(ModelKind::term, "term");
+      print_list(ModelKind::hair_term, "hair term");
       fmt::print("`lobefit models NAME` describes one.\n");
     }
   });

@@ -33,13 +33,13 @@ Table table_of(const PlotArguments& a, const Context& context) {
     return values;
   };
   const Reference* reference = find_reference_or_null(a.name);
-  const Grid grid = Grid::named_or_file(a.grid, reference && reference->sphere);
+  const Model* model = reference ? nullptr : &find_model(a.name);
+  const Grid grid = Grid::named_or_file(a.grid, reference ? reference->sphere : is_hair(model->info->kind));
   if (reference) {
     return render(*reference, prepared(reference->defaults()), parse_axes(a.axes), grid,
                   {.sampling = {.samples = 1u << 14, .seed = context.seed}}, *monitor);
   }
-  const Model& model = find_model(a.name);
-  return render(model, prepared(model.defaults()), parse_axes(a.axes), grid, *monitor);
+  return render(*model, prepared(model->defaults()), parse_axes(a.axes), grid, *monitor);
 }
 
 /// "NAME:k=v,…" or "fit.json:k=v,…" over the table; a value that is no number is a mapping of a table axis.

@@ -80,7 +80,7 @@ void add_render(CLI::App& app, Context& context) {
                                 .shared_facets = a->facets == "shared"};
     const Reference* reference = find_reference_or_null(a->name);
     const Model* model = reference ? nullptr : &find_model(a->name);
-    const Grid grid = Grid::named_or_file(a->grid, reference && reference->sphere);
+    const Grid grid = Grid::named_or_file(a->grid, reference ? reference->sphere : is_hair(model->info->kind));
     ParameterValues values = reference ? reference->defaults() : model->defaults();
     set_parameters(values, a->settings);
     RenderJob job;

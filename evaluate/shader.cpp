@@ -207,13 +207,18 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
   const std::string name = "Lobefit_" + std::string(model.name);
   std::string text = "// " + std::string(model.title) + ".\n// Source: " + std::string(model.source) + ".\n";
   for (const std::string& line : provenance) text += "// " + line + "\n";
-  text +=
-      "// wi: to the light, wo: to the viewer; unit vectors of the tangent frame, z the normal.\n" +
-      std::string(model.kind == ModelKind::term ? "// Returns the term at their half vector, the same in all channels."
-                                                : "// Returns the BRDF in 1/sr, without cosine.") +
-      (model.transmits ? "\n// Multiply it by |N.L|: light from behind comes through." : "") +
-      "\n\n"
-      "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265\n#endif\n\n";
+  const std::string_view axis = is_hair(model.kind) ? "the fibre's axis" : "the normal";
+  const std::string_view result =
+      is_hair(model.kind) && is_term(model.kind) ? "the term, the same in all channels"
+      : is_hair(model.kind) ? "S in 1/sr: the radiance that leaves is the integral of S L over all directions, without "
+                              "cosine"
+      : is_term(model.kind) ? "the term at their half vector, the same in all channels"
+                            : "the BRDF in 1/sr, without cosine";
+  text += "// wi: to the light, wo: to the viewer; unit vectors of the tangent frame, z " + std::string(axis) +
+          ".\n// Returns " + std::string(result) + "." +
+          (model.transmits ? "\n// Multiply it by |N.L|: light from behind comes through." : "") +
+          "\n\n"
+          "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265\n#endif\n\n";
 
   text += "struct " + name + "_Parameters {\n";
   for (const ShaderParameter& parameter : parameters) {

@@ -25,13 +25,18 @@
 namespace lobefit {
 
 enum class ModelKind {
-  brdf,  // 1/sr, without cosine; 0 below the horizon
-  term,  // a factor of a BRDF, evaluated at the half vector, the same in all channels; 0 below the horizon too
-  hair,  // z is the fibre's axis; any direction
+  brdf,       // 1/sr, without cosine; 0 below the horizon
+  term,       // a factor of a BRDF, evaluated at the half vector, the same in all channels; 0 below the horizon too
+  hair,       // z is the fibre's axis; any direction
+  hair_term,  // a factor of a hair model, the same in all channels
 };
 
+/// Around a fibre, not on a surface.
+constexpr bool is_hair(ModelKind kind) { return kind == ModelKind::hair || kind == ModelKind::hair_term; }
+constexpr bool is_term(ModelKind kind) { return kind == ModelKind::term || kind == ModelKind::hair_term; }
+
 inline std::string_view kind_name(ModelKind kind) {
-  constexpr std::array<std::string_view, 3> names{"brdf", "term", "hair"};
+  constexpr std::array<std::string_view, 4> names{"brdf", "term", "hair", "term"};
   return names[static_cast<std::size_t>(kind)];
 }
 
@@ -59,7 +64,7 @@ LOBEFIT_TEXT Vec3<T> evaluate_brdf(const typename M::template Parameters<T>& p, 
   // Not const: see make_geometry().
   Geometry<G> g = make_geometry(wi, wo);
   Vec3<T> brdf = M::evaluate(p, g);
-  if constexpr (M::info.kind == ModelKind::hair) {
+  if constexpr (is_hair(M::info.kind)) {
     return brdf;
   } else if constexpr (M::info.transmits) {
     return select(g.cos_theta_o > 0.0, brdf, Vec3<T>{T(0.0), T(0.0), T(0.0)});

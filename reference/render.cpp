@@ -271,7 +271,7 @@ Table render(const Reference& reference, const ParameterValues& values, std::vec
 
 Table render(const Model& model, const ParameterValues& values, std::vector<Axis> parameter_axes, const Grid& grid,
              Monitor& monitor, const RenderJob& job) {
-  check_hemisphere(grid, std::string(model.info->name));
+  if (!is_hair(model.info->kind)) check_hemisphere(grid, std::string(model.info->name));
   Canvas canvas = make_canvas(values, std::move(parameter_axes), grid);
   Table& table = canvas.table;
   for (const ParameterInfo& info : values.list()) {

@@ -227,67 +227,6 @@ TEST(LeastSquares, StopsWhenInterruptedOrThrownAt) {
   EXPECT_THROW(solve(throwing, silent), std::logic_error);
 }
 
-// ---- derivatives ------------------------------------------------------------------------------------------------
-
-TEST(DualModels, DerivativesAreThoseOfTheModel) {
-  // Four-point central differences of the model in double; variables straddle the boundary between two passes.
-  constexpr std::size_t pairs = 40;
-  int tested = 0, kinks = 0;
-  for (const Model& model : models()) {
-    const DualModel& dual = dual_model(model);
-    ASSERT_EQ(dual.name, model.info->name);
-    const std::size_t slots = model.defaults().flat().size();
-    std::vector<Direction> wi, wo;
-    for (const DirectionPair& pair : random_pairs(pairs, 3)) {
-      wi.push_back(pair.wi);
-      wo.push_back(pair.wo);
-    }
-    for (const std::vector<double>& flat : interior_parameters(model.parameters, 3, 0.2, 5)) {
-      std::vector<int> variable_of_slot(slots);
-      std::iota(variable_of_slot.begin(), variable_of_slot.end(), dual_width - 2);
-      for (const int first : {0, dual_width}) {
-        std::vector<double> values(3 * pairs), derivatives(3 * pairs * dual_width);
-        dual.evaluate(flat, variable_of_slot, first, wi, wo, 3, values.data(), derivatives.data());
-        for (std::size_t i = 0; i < pairs; ++i) {
-          const auto channels = [&](const std::vector<double>& at) {
-            const Rgb f = model.evaluate(at, wi[i], wo[i]);
-            return std::array{f.x, f.y, f.z};
-          };
-          for (std::size_t c = 0; c < 3; ++c) {
-            // Batches are compiled per instruction set, so their last bits may differ.
-            EXPECT_NEAR(values[c * pairs + i], channels(flat)[c], 1e-13 * std::abs(channels(flat)[c]));
-          }
-          for (std::size_t slot = 0; slot < slots; ++slot) {
-            const int k = variable_of_slot[slot] - first;
-            if (k < 0 || k >= dual_width) continue;
-            const double step = 1e-3 * std::max(0.01, std::abs(flat[slot]));
-            const auto moved = [&](double by) {
-              std::vector<double> at = flat;
-              at[slot] += by;
-              return channels(at);
-            };
-            const auto far_up = moved(2.0 * step), up = moved(step), down = moved(-step), far_down = moved(-2.0 * step);
-            for (std::size_t c = 0; c < 3; ++c) {
-              const double narrow = (up[c] - down[c]) / (2.0 * step), wide = (far_up[c] - far_down[c]) / (4.0 * step);
-              const double difference = (4.0 * narrow - wide) / 3.0;
-              // Across a kink the two differences disagree; there the derivative is one-sided and not tested.
-              if (std::abs(narrow - wide) > 1e-3 * std::abs(narrow) + 1e-6) {
-                ++kinks;
-                continue;
-              }
-              ++tested;
-              EXPECT_NEAR(derivatives[(c * pairs + i) * dual_width + static_cast<std::size_t>(k)], difference,
-                          1e-6 * std::abs(difference) + 1e-8)
-                  << model.info->name << ", slot " << slot << ", channel " << c;
-            }
-          }
-        }
-      }
-    }
-  }
-  EXPECT_LT(20 * kinks, tested);
-}
-
 TEST(Fits, EndWhereTheirMetricIsStationary) {
   // The metric, computed apart, may not fall to either side of the fitted constants. A wrong Jacobian, weight or slope
   // of a quantity ends elsewhere.

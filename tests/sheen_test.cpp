@@ -132,10 +132,11 @@ TEST(SheenZeltner, SamplesItsOwnLobe) {
 TEST(SheenCharlie, LambdaMatchesItsFit) {
   // α = 1 has the second column alone: L(½) = 21.5473/(1 + 3.82987 · ½^.19823) - .98880 - 4.32054.
   const double half = 21.5473 / (1.0 + 3.82987 * std::pow(0.5, 0.19823)) - 0.98880 - 4.32054;
-  EXPECT_NEAR(CharlieLambda::evaluate(0.5, 1.0), std::exp(half), 1e-12);
+  EXPECT_NEAR(std::exp(CharlieLogLambda::evaluate(0.5, 1.0)), std::exp(half), 1e-12);
   // Continuous at ½, 0 (to the fit's few percent) at the normal.
-  EXPECT_NEAR(CharlieLambda::evaluate(0.5 - 1e-12, 0.3), CharlieLambda::evaluate(0.5 + 1e-12, 0.3), 1e-9);
-  EXPECT_LT(CharlieLambda::evaluate(1.0, 0.5), 0.01);
+  EXPECT_NEAR(std::exp(CharlieLogLambda::evaluate(0.5 - 1e-12, 0.3)),
+              std::exp(CharlieLogLambda::evaluate(0.5 + 1e-12, 0.3)), 1e-9);
+  EXPECT_LT(std::exp(CharlieLogLambda::evaluate(1.0, 0.5)), 0.01);
 }
 
 TEST(SheenCharlie, FitIsSmithsFunction) {
@@ -152,7 +153,7 @@ TEST(SheenCharlie, FitIsSmithsFunction) {
                   CharlieDistribution::evaluate(z * z, r * r, alpha);
         }
       }
-      const double exact = area / cosine, fitted = 1.0 + CharlieLambda::evaluate(cosine, alpha);
+      const double exact = area / cosine, fitted = 1.0 + std::exp(CharlieLogLambda::evaluate(cosine, alpha));
       std::printf("alpha %.1f, cosine %.1f: 1 + Lambda %.4f, fitted %.4f\n", alpha, cosine, exact, fitted);
       EXPECT_NEAR(fitted, exact, (alpha < 0.5 ? 0.12 : 0.03) * exact) << alpha << " " << cosine;
     }
@@ -164,7 +165,8 @@ TEST(SheenCharlie, IsDistributionTimesVisibility) {
     const double d = value("d_charlie", {{"alpha", 0.4}}, wi, wo);
     const double cloth = d * value("vis_cloth", {}, wi, wo);
     EXPECT_NEAR(value("sheen_charlie", {{"alpha", 0.4}, {"visibility", 2.0}}, wi, wo), cloth, 1e-12 * cloth);
-    const double i = CharlieLambda::evaluate(wi.z, 0.4), o = CharlieLambda::evaluate(wo.z, 0.4);
+    const double i = std::exp(CharlieLogLambda::evaluate(wi.z, 0.4)),
+                 o = std::exp(CharlieLogLambda::evaluate(wo.z, 0.4));
     const double smith = d / (4.0 * wi.z * wo.z * (1.0 + i + o));
     EXPECT_NEAR(value("sheen_charlie", {{"alpha", 0.4}, {"visibility", 0.0}}, wi, wo), smith, 1e-11 * smith);
     const double soft = d / (4.0 * wi.z * wo.z * (1.0 + std::pow(i, 1.0 + 2.0 * std::pow(1.0 - wi.z, 8)) + o));

@@ -426,49 +426,5 @@ TEST(Sampling, VisibleFacetsAreTheReferences) {
   }
 }
 
-TEST(Sampling, ModelsThatOfferIt) {
-  int found = 0;
-  for (const Model& model : models()) {
-    ASSERT_EQ(model.sample == nullptr, model.pdf == nullptr) << model.info->name;
-    if (!model.sample) continue;
-    ++found;
-    // χ² of sample() against pdf() over z × azimuth of the light.
-    constexpr int bands = 10, turns = 16, count = 200'000;
-    ParameterValues values = model.defaults();
-    // Cells are too large for the quadrature of a sharp coat.
-    if (values.has("clear_coat_roughness")) values.set("clear_coat_roughness", 0.5);
-    const Direction wo = direction(radians(50.0), 0.4);
-    UniformNumbers uniform(77);
-    std::vector<double> hits(bands * turns);
-    for (int i = 0; i < count; ++i) {
-      const double u0 = uniform(), u1 = uniform();
-      const Direction wi = model.sample(values.flat(), wo, {u0, u1});
-      EXPECT_NEAR(dot(wi, wi), 1.0, 1e-9);
-      if (wi.z <= 0.0) continue;
-      const double turn = std::atan2(wi.y, wi.x) / (2.0 * pi);
-      ++hits[static_cast<std::size_t>(std::min(bands - 1, static_cast<int>(bands * wi.z)) * turns +
-                                      std::min(turns - 1, static_cast<int>(turns * (turn < 0.0 ? turn + 1.0 : turn))))];
-    }
-    double chi2 = 0.0;
-    int cells = 0;
-    for (int band = 0; band < bands; ++band) {
-      for (int turn = 0; turn < turns; ++turn) {
-        double share = 0.0;
-        for (const auto& [z, wz] : gauss_legendre(16, band / 10.0, (band + 1) / 10.0)) {
-          for (const auto& [phi, wphi] : gauss_legendre(16, 2.0 * pi * turn / turns, 2.0 * pi * (turn + 1) / turns)) {
-            share += wz * wphi * model.pdf(values.flat(), direction(std::acos(z), phi), wo);
-          }
-        }
-        const double expected = share * count, seen = hits[static_cast<std::size_t>(band * turns + turn)];
-        if (expected < 8.0) continue;
-        chi2 += (seen - expected) * (seen - expected) / expected;
-        ++cells;
-      }
-    }
-    EXPECT_LT(chi2, cells + 5.0 * std::sqrt(2.0 * cells)) << model.info->name;
-  }
-  EXPECT_GE(found, 2) << "lambert, specular_ggx";
-}
-
 }  // namespace
 }  // namespace lobefit

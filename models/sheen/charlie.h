@@ -8,14 +8,14 @@
 
 namespace lobefit {
 
-/// Smith's Λ of d_charlie, which has no closed form, as its authors fit it: exp(L(μ)) below μ = ½, exp(2 L(½) - L(1 -
-/// μ)) above, L(x) = a/(1 + b x^c) + d x + e. Each of a … e lies between its values at alpha 0 and 1 by (1 - alpha)².
-struct CharlieLambda {
-  static constexpr const char* name = "lambda_charlie";
+/// Logarithm of Smith's Λ of d_charlie, which has no closed form, as its authors fit it: L(μ) below μ = ½, 2 L(½) - L(1
+/// - μ) above, L(x) = a/(1 + b x^c) + d x + e. Each of a … e lies between its values at alpha 0 and 1 by (1 - alpha)².
+struct CharlieLogLambda {
+  static constexpr const char* name = "log_lambda_charlie";
   static constexpr std::array arguments{"cos_theta", "alpha"};
 
   struct Curve {
-    static constexpr const char* name = "lambda_charlie_curve";
+    static constexpr const char* name = "log_lambda_charlie_curve";
     static constexpr std::array arguments{"x", "smoothness2"};
 
     template <class X, class T>
@@ -34,7 +34,7 @@ struct CharlieLambda {
     const T smoothness2 = let("smoothness2", square(1.0 - alpha));
     const T near_half = let("near_half", call<Curve>(min(cos_theta, 1.0 - cos_theta), smoothness2));
     const T half_way = let("half_way", call<Curve>(0.5, smoothness2));
-    return exp(select(cos_theta < 0.5, near_half, 2.0 * half_way - near_half));
+    return select(cos_theta < 0.5, near_half, 2.0 * half_way - near_half);
   }
 };
 
@@ -105,13 +105,14 @@ struct SheenCharlie : CosineSampling {
     if constexpr (choice == 2) {
       return T(ClothVisibility::at(g));
     } else {
-      T lambda_i = let("lambda_i", call<CharlieLambda>(g.cos_theta_i, p.alpha));
-      const T lambda_o = let("lambda_o", call<CharlieLambda>(g.cos_theta_o, p.alpha));
+      T log_lambda_i = let("log_lambda_i", call<CharlieLogLambda>(g.cos_theta_i, p.alpha));
+      const T lambda_o = let("lambda_o", exp(call<CharlieLogLambda>(g.cos_theta_o, p.alpha)));
       // Λ^(1 + 2 (1 - μ)⁸) of the light: more of it is shadowed next to grazing angles, without an edge.
       if constexpr (choice == 1) {
         const G grazing = let("grazing", square(square(square(1.0 - g.cos_theta_i))));
-        lambda_i = let("softened_i", pow(lambda_i, T(1.0 + 2.0 * grazing)));
+        log_lambda_i = let("softened_i", log_lambda_i * (1.0 + 2.0 * grazing));
       }
+      const T lambda_i = let("lambda_i", exp(log_lambda_i));
       const G denominator = let("denominator", 4.0 * max(g.cos_theta_i * g.cos_theta_o, 1e-30));
       return 1.0 / (denominator * (1.0 + lambda_i + lambda_o));
     }

@@ -63,7 +63,7 @@ struct SpecularGgx {
       .isotropic = false,
       .doc =
           "One bounce between GGX mirrors, height-correlated Smith masking, Schlick's Fresnel. Anisotropy as Kulla "
-          "and Conty map it."};
+          "and Conty map it. Glints, which no smooth distribution has, are not modelled yet."};
 
   template <class T>
   struct Parameters {

@@ -9,6 +9,16 @@
 
 namespace lobefit {
 
+/// Of the half vector, unless the text says otherwise.
+template <class Text>
+constexpr ModelKind term_kind() {
+  if constexpr (requires { Text::kind; }) {
+    return Text::kind;
+  } else {
+    return ModelKind::term;
+  }
+}
+
 /// `Text` at the half vector of wi and wo, its parameters declared one by one:
 ///
 ///   using DGgx = Term<GgxDistribution, term_alpha>;    // Text::at(geometry, alpha)
@@ -17,7 +27,7 @@ struct Term {
   static constexpr ModelInfo info{.name = Text::name,
                                   .title = Text::title,
                                   .source = Text::source,
-                                  .kind = ModelKind::term,
+                                  .kind = term_kind<Text>(),
                                   // In that it doesn't care which direction is the light's.
                                   .reciprocal = true,
                                   .isotropic = ((declared.name != "alpha_x") && ...),
