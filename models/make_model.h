@@ -20,7 +20,8 @@ Model make_model() {
                     const auto p = unflatten<M, double>(flat);
                     for (std::size_t i = 0; i < values.size(); ++i) values[i] = evaluate_brdf<M>(p, wi[i], wo[i]);
                   }};
-  if constexpr (requires { M::sample; }) {
+  using P = typename M::template Parameters<double>;
+  if constexpr (requires(const P& p, const Direction& wo, const std::array<double, 2>& u) { M::sample(p, wo, u); }) {
     model.sample = [](std::span<const double> flat, const Direction& wo, const std::array<double, 2>& u) {
       return M::sample(unflatten<M, double>(flat), wo, u);
     };

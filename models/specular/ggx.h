@@ -10,17 +10,27 @@
 
 namespace lobefit {
 
-/// D V of GGX facets with height-correlated Smith masking: times a Fresnel term it is the BRDF. `alpha` may be 0 (see
-/// smallest_alpha).
+/// D V of GGX facets with height-correlated Smith masking. `alpha` may be 0 (see smallest_alpha).
+struct GgxLobe {
+  static constexpr const char* name = "ggx_lobe";
+  static constexpr std::array arguments{"sin2_theta_h", "cos_theta_i", "cos_theta_o", "alpha"};
+
+  template <class G, class T>
+  LOBEFIT_TEXT static T evaluate(const G& sin2_theta_h, const G& cos_theta_i, const G& cos_theta_o, const T& alpha) {
+    const T a = let("a", max(alpha, smallest_alpha));
+    const T length_i = let("length_i", call<StretchedLength>(cos_theta_i, a));
+    const T length_o = let("length_o", call<StretchedLength>(cos_theta_o, a));
+    const T visibility = let("visibility", call<SmithGgxVisibility>(cos_theta_i, length_i, cos_theta_o, length_o));
+    return call<GgxDistribution>(sin2_theta_h, a) * visibility;
+  }
+};
+
+/// The lobe of a pair of directions: times a Fresnel term it is the BRDF.
 ///
 ///   f = ggx_lobe(alpha, g) * call<SchlickFresnel>(g.cos_theta_d, f0, f90);
 template <class T, class G>
 LOBEFIT_TEXT T ggx_lobe(const T& alpha, const Geometry<G>& g) {
-  const T a = max(alpha, smallest_alpha);
-  const T length_i = let("length_i", call<StretchedLength>(g.cos_theta_i, a));
-  const T length_o = let("length_o", call<StretchedLength>(g.cos_theta_o, a));
-  const T visibility = let("visibility", call<SmithGgxVisibility>(g.cos_theta_i, length_i, g.cos_theta_o, length_o));
-  return let("d", call<GgxDistribution>(g.sin2_theta_h, a)) * visibility;
+  return call<GgxLobe>(g.sin2_theta_h, g.cos_theta_i, g.cos_theta_o, alpha);
 }
 
 /// √((αx x)² + (αy y)² + z²): see StretchedLength.
