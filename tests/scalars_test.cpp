@@ -23,6 +23,8 @@ inline TestJet min(const TestJet& a, const TestJet& b) { return a < b ? a : b; }
 inline TestJet max(const TestJet& a, const TestJet& b) { return a > b ? a : b; }
 inline TestJet min(const TestJet& a, double b) { return min(a, TestJet(b)); }
 inline TestJet max(const TestJet& a, double b) { return max(a, TestJet(b)); }
+/// Flat where the radicand vanishes, as models/scalar.h has it; a Jet's own slope is infinite there.
+inline TestJet sqrt(const TestJet& a) { return a.a > 0.0 ? sqrt<double, 16>(a) : TestJet(0.0); }
 inline std::int32_t to_index(const TestJet& x) { return static_cast<std::int32_t>(x.a); }
 inline TestJet select(bool condition, const TestJet& a, const TestJet& b) { return condition ? a : b; }
 
