@@ -96,9 +96,6 @@ Json parameters_json(const ParameterValues& values) {
   return json;
 }
 
-namespace {
-
-/// The row of a table whose parameters are `settings`; a table without axes has one.
 std::size_t find_row(const Table& table, const std::vector<std::string>& settings) {
   std::vector<std::size_t> index(table.parameter_axes.size(), 0);
   std::vector<bool> set(table.parameter_axes.size(), false);
@@ -132,8 +129,6 @@ std::size_t find_row(const Table& table, const std::vector<std::string>& setting
   return row;
 }
 
-}  // namespace
-
 Source find_source(const std::string& name, const std::vector<std::string>& settings) {
   if (const Reference* reference = find_reference_or_null(name)) {
     ParameterValues values = reference->defaults();
@@ -148,14 +143,19 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
             reference->fibre};
   }
   if (is_file(name)) {
-    const auto table = std::make_shared<Table>(Table::read(name));
-    const std::size_t row = find_row(*table, settings);
-    Json parameters = table->parameters;
-    const std::vector<double> coordinates = table->parameter_values(row);
-    for (std::size_t i = 0; i < coordinates.size(); ++i) parameters[table->parameter_axes[i].name] = coordinates[i];
-    return {
-        name, table->channels, table->grid.theta_i.values.back() >= 90.0 || table->grid.theta_o.values.back() >= 90.0,
-        [table, row](const Direction& wi, const Direction& wo) { return table->interpolate(row, wi, wo); }, parameters};
+    const auto file = std::make_shared<BrdfFile>(read_brdf_file(name));
+    const Table& table = file->table;
+    const std::size_t row = find_row(table, settings);
+    Json parameters = table.parameters;
+    const std::vector<double> coordinates = table.parameter_values(row);
+    for (std::size_t i = 0; i < coordinates.size(); ++i) parameters[table.parameter_axes[i].name] = coordinates[i];
+    const bool sphere = table.coordinates == Coordinates::spherical &&
+                        (table.grid.theta_i.values.back() >= 90.0 || table.grid.theta_o.values.back() >= 90.0);
+    Source source{name, table.channels, sphere,
+                  [file, row](const Direction& wi, const Direction& wo) { return file->evaluate(wi, wo, row); },
+                  parameters};
+    if (file->rgl) source.albedo_of_light = [file](double theta) { return file->rgl->albedo_of_light(theta); };
+    return source;
   }
   const Model& model = find_model(name);
   ParameterValues values = model.defaults();

@@ -11,6 +11,7 @@
 
 #include "fit/fit.h"
 #include "models/registry.h"
+#include "reference/formats/brdf_file.h"
 #include "reference/render.h"
 
 namespace lobefit {
@@ -73,7 +74,11 @@ struct Source {
   Json parameters;
   std::shared_ptr<const Integrator> integrator = nullptr;  // of a reference
   bool fibre = false;                                      // z is its axis
+  /// Directional albedo with the light at `theta` radians, of files that have their own quadrature.
+  std::function<Albedo(double theta)> albedo_of_light = nullptr;
 };
+/// One parameter row of a file: that of `settings`; a table without axes has one. Throws Error(usage).
+std::size_t find_row(const Table& table, const std::vector<std::string>& settings);
 Source find_source(const std::string& name, const std::vector<std::string>& settings);
 /// Parameters as JSON: numbers, lists, choices by name.
 Json parameters_json(const ParameterValues& values);

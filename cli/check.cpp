@@ -38,7 +38,7 @@ CheckResult check_one(const CheckArguments& a, const std::string& name, const Co
   CheckResult result = check_simd(
       *choice.model, varied_parameters(choice.values, vary, parameter_set_count, context.seed), a.options, *monitor);
   if (!a.table.empty()) {
-    const Table table = Table::read(a.table);
+    const Table table = read_table(a.table);
     const ModelChoice on_table = choose_for_table(name, a.settings, a.mappings, table);
     result.table = check_against_table(TableModel(*on_table.model, on_table.values, table, on_table.mappings), table);
   }

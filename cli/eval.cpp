@@ -95,9 +95,10 @@ std::string evaluate_csv(const Source& source, const std::string& name) {
 void add_eval(CLI::App& app, Context& context) {
   CLI::App* verb = app.add_subcommand(
       "eval",
-      "BRDF of a model, a reference (by quadrature) or a table file (interpolated), in 1/sr without cosine\n"
+      "BRDF of a model, a reference (by quadrature) or a file (interpolated), in 1/sr without cosine\n"
       "  lobefit eval proxima --set alpha=0.5 --set albedo=0.8,0.5,0.2 --wi 60,0 --wo 30,180\n"
-      "  lobefit eval burley --csv pairs.csv -o values.csv");
+      "  lobefit eval burley --csv pairs.csv -o values.csv\n"
+      "  lobefit eval aurora_white_rgb.bsdf --wi 30,0 --wo 30,180");
   const auto a = std::make_shared<EvalArguments>();
   verb->add_option("NAME", a->name, "Model, reference or table file")->required();
   add_repeatable(*verb, "--set", a->settings, "NAME=VALUE or NAME=r,g,b (repeatable)");
@@ -177,6 +178,8 @@ void add_albedo(CLI::App& app, Context& context) {
         const Estimate estimated =
             estimate_albedo(*source.integrator, radians(theta), fixed, domain, options, monitor.get());
         result = {estimated.f, estimated.stderr_f};
+      } else if (source.albedo_of_light && fixed == FixedDirection::light) {
+        result = source.albedo_of_light(radians(theta));
       } else {
         result = directional_albedo(source.evaluate, radians(theta), fixed, domain);
       }

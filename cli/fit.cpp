@@ -78,7 +78,7 @@ void add_fit(CLI::App& app, Context& context) {
       "ci95 covers the table's own Monte Carlo error, misfit_stderr what the model's misfit leaves open.");
   const auto a = std::make_shared<FitArguments>();
   verb->add_option("MODEL", a->model, "Model: see `lobefit models`")->required();
-  verb->add_option("TABLE", a->table, "Table file")->required();
+  verb->add_option("TABLE", a->table, "Table or measured file (EXR, MERL, RGL, UTIA, ALTA, Klems)")->required();
   verb->add_option("-o,--output", a->output, "Fit to write (.json)");
   add_repeatable(*verb, "--free", a->free, "Parameters to fit, NAME or NAME=START (repeatable, or separated by commas)")
       ->delimiter(',');
@@ -109,7 +109,7 @@ void add_fit(CLI::App& app, Context& context) {
     options.seed = context.seed;
     parse_loss(a->loss, options);
     for (const std::string& text : a->mappings) options.mappings.push_back(AxisMapping::parse(text));
-    const Table table = Table::read(a->table);
+    const Table table = read_table(a->table);
     ParameterValues values = with_table_parameters(model.defaults(), table);
     options.free = choose_free(*a, table, options, values);
     std::optional<OutputFile> file;

@@ -25,7 +25,9 @@ Table table_of(const PlotArguments& a, const Context& context) {
     if (!a.settings.empty() || !a.axes.empty()) {
       throw Error(ExitCode::usage, "a table has its parameters already", "plot", "leave out --set and --axis");
     }
-    return Table::read(a.name);
+    const BrdfFile file = read_brdf_file(a.name);
+    // Figures cut along angles, which measured grids do not have.
+    return file.table.coordinates == Coordinates::spherical ? file.table : file.resampled(Grid::named_or_file(a.grid));
   }
   const auto monitor = context.monitor();
   const auto prepared = [&](ParameterValues values) {
@@ -85,13 +87,13 @@ void add_plot(CLI::App& app, Context& context) {
     CLI::App* kind = verb->add_subcommand(name, description);
     kind->fallthrough();
     const auto a = std::make_shared<PlotArguments>();
-    kind->add_option("NAME", a->name, "Table file, reference or model")->required();
+    kind->add_option("NAME", a->name, "Table or measured file, reference or model")->required();
     add_repeatable(*kind, "--with", a->models,
                    "Model or fit to draw against it, NAME or NAME:parameter=value,… (repeatable);\n"
                    "a value SCALE*AXIS^POWER maps a table axis");
     add_repeatable(*kind, "--set", a->settings, "NAME=VALUE of a reference or model (repeatable)");
     add_repeatable(*kind, "--axis", a->axes, "NAME=v1,v2,… of a reference or model (repeatable)");
-    kind->add_option("--grid", a->grid, "Grid for a reference or model")->capture_default_str();
+    kind->add_option("--grid", a->grid, "Grid for a reference, a model or a measured file")->capture_default_str();
     kind->add_option("--theta-o", a->theta_o, "View angle in degrees")->capture_default_str();
     kind->add_option("--phi", a->phi, "Azimuth difference in degrees: 0 is the retro side")->capture_default_str();
     kind->add_option("--title", a->title, "Title (default: the name)");

@@ -6,6 +6,7 @@
 #include "cli/arguments.h"
 #include "cli/sampling.h"
 #include "cli/slice.h"
+#include "reference/formats/brdf_file.h"
 #include "reference/merge.h"
 #include "reference/metric.h"
 #include "reference/output_file.h"
@@ -15,13 +16,32 @@ namespace lobefit {
 
 namespace {
 
+/// A file to read, with what only some formats need.
+struct FileArguments {
+  std::string name, material, utia = "raw";
+
+  void add_to(CLI::App& verb) {
+    verb.add_option("FILE", name, "Table or measured file, known by its bytes")->required();
+    verb.add_option("--material", material, "Which material of a file that holds several (NBRDF weights)");
+    verb.add_option("--utia-scale", utia,
+                    "UTIA files only, whose scale readers dispute: raw, or srgb (/140, decoded, times 100)")
+        ->check(CLI::IsMember({"raw", "srgb"}))
+        ->capture_default_str();
+  }
+  ReadOptions read_options() const {
+    return {.material = material, .utia_scale = utia == "raw" ? Utia::Scale::raw : Utia::Scale::srgb};
+  }
+};
+
 void add_info(CLI::App& tables, Context& context) {
   CLI::App* verb = tables.add_subcommand("info", "Axes, channels, entries and provenance");
-  const auto name = std::make_shared<std::string>();
-  verb->add_option("TABLE", *name, "Table file")->required();
-  verb->callback([&context, name] {
-    const Table table = Table::read(*name);
-    const Json description = table.describe();
+  const auto a = std::make_shared<FileArguments>();
+  a->add_to(*verb);
+  verb->callback([&context, a] {
+    const BrdfFile file = read_brdf_file(a->name, a->read_options());
+    const Table& table = file.table;
+    Json description = table.describe();
+    description["format"] = file_format_names[static_cast<std::size_t>(file.format)];
     if (context.json) {
       std::cout << description.dump(2) << "\n";
       return;
@@ -31,6 +51,8 @@ void add_info(CLI::App& tables, Context& context) {
       fmt::print("  {:<10} {:>4} {} from {:g} to {:g} {}\n", axis["name"].get<std::string>(), values.size(),
                  axis["kind"].get<std::string>(), values.front(), values.back(), axis["unit"].get<std::string>());
     }
+    fmt::print("  {} coordinates, file format {}\n", description["coordinates"].get<std::string>(),
+               description["format"].get<std::string>());
     fmt::print("  {} entries, {} masked, {} channel{}, {} replicates\n", table.entries(), table.masked(),
                table.channels, table.channels == 1 ? "" : "s", description["replicates"].get<int>());
     for (const auto& [key, value] : description["provenance"].items()) {
@@ -53,7 +75,7 @@ void add_slice(CLI::App& tables, Context& context) {
   add_repeatable(*verb, "--at", a->at, "AXIS=VALUE holds an axis at one of its values (repeatable)");
   verb->add_option("-o,--output", a->output, "File to write, .csv or .png (default: CSV on stdout)");
   verb->callback([&context, a] {
-    const Table table = Table::read(a->name);
+    const Table table = read_table(a->name);
     const Slice slice = cut(table, a->at);
     if (!a->output.ends_with(".png")) {
       write_or_print(slice.csv(), a->output, context.force);
@@ -65,6 +87,24 @@ void add_slice(CLI::App& tables, Context& context) {
     }
     write_false_colour(slice.cosine_picture(), slice.axes[1].size(), slice.axes[0].size(), a->output, context.force);
   });
+}
+
+/// A file's values at a table's entries, whatever its own grid; where it has none the table is masked.
+std::vector<float> values_at_entries(const BrdfFile& file, Table& table) {
+  std::vector<float> values(table.values.size());
+  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+    if (!table.valid[entry]) continue;
+    try {
+      const Rgb f = file.evaluate(table.wi(entry), table.wo(entry));
+      const std::array<double, 3> components{f.x, f.y, f.z};
+      for (std::size_t c = 0; c < static_cast<std::size_t>(table.channels); ++c) {
+        values[c * table.entries() + entry] = static_cast<float>(components[c]);
+      }
+    } catch (const Error&) {
+      table.valid[entry] = 0;
+    }
+  }
+  return values;
 }
 
 void add_compare(CLI::App& tables, Context& context) {
@@ -79,7 +119,8 @@ void add_compare(CLI::App& tables, Context& context) {
   };
   const auto a = std::make_shared<Arguments>();
   verb->add_option("A", a->first, "Table file")->required();
-  verb->add_option("B", a->second, "Table file on the same grid, model, or fit (JSON)")->required();
+  verb->add_option("B", a->second, "Table file on the same grid, measured file on any, model, or fit (JSON)")
+      ->required();
   add_repeatable(*verb, "--set", a->settings, "NAME=VALUE of the model (repeatable)");
   add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER of the model (repeatable)");
   verb->add_option(
@@ -90,16 +131,23 @@ void add_compare(CLI::App& tables, Context& context) {
       ->capture_default_str();
   auto* tolerance = verb->add_option("--tolerance", a->tolerance, "Exit with 5 if the metric is larger");
   verb->callback([&context, a, tolerance] {
-    const Table table = Table::read(a->first);
+    Table table = read_table(a->first);
     const Quantity bounded = parse_quantity(a->metric);
     std::vector<float> values;
     if (is_file(a->second) && !a->second.ends_with(".json")) {
-      const Table other = Table::read(a->second);
-      if (other.describe()["axes"] != table.describe()["axes"] || other.channels != table.channels) {
+      const BrdfFile file = read_brdf_file(a->second);
+      const Table& other = file.table;
+      const bool measured = table.coordinates != Coordinates::spherical || other.coordinates != Coordinates::spherical;
+      if (measured && !other.same_grid(table) && other.channels == table.channels && other.parameter_rows() == 1) {
+        values = values_at_entries(file, table);
+      } else if (!other.same_grid(table) || other.channels != table.channels) {
         throw Error(ExitCode::invalid_input, "the tables have different axes", a->second,
                     "render both over the same grid; `lobefit table info` shows it");
+      } else {
+        values = other.values;
+        for (std::size_t entry = 0; measured && entry < table.entries(); ++entry)
+          table.valid[entry] &= other.valid[entry];
       }
-      values = other.values;
     } else {
       const ModelChoice choice = choose_for_table(a->second, a->settings, a->mappings, table);
       values = TableModel(*choice.model, choice.values, table, choice.mappings).render().values;
@@ -138,6 +186,49 @@ void print_written(const Context& context, const Table& table, const std::string
   } else {
     fmt::print("{}: {} entries ({} masked)\n", output, table.entries(), table.masked());
   }
+}
+
+void add_convert(CLI::App& tables, Context& context) {
+  CLI::App* verb = tables.add_subcommand(
+      "convert",
+      "Between formats: any file is read, known by its bytes; EXR, MERL, RGL, ALTA text and CSV are written\n"
+      "  lobefit table convert aurora_white_rgb.bsdf -o aurora_white.binary      RGL to MERL\n"
+      "  lobefit table convert merl_nbrdf.txt --material brass -o brass.binary   network weights to a MERL table\n"
+      "  lobefit table convert brass.binary --grid default -o brass.exr          onto a grid of angles\n"
+      "Files keep their own grid where the format written has one for it. A MERL bin holds the mean of both orders\n"
+      "of its directions; values below 0 become 0 there, and what has no value -1.");
+  struct Arguments {
+    FileArguments file;
+    std::string output, format, grid;
+    std::vector<std::string> settings;
+  };
+  const auto a = std::make_shared<Arguments>();
+  a->file.add_to(*verb);
+  verb->add_option("-o,--output", a->output, "File to write: .exr, .binary (MERL), .bsdf (RGL), .alta, .csv")
+      ->required();
+  verb->add_option("--format", a->format, "Instead of the extension: exr, merl, rgl, alta, csv");
+  verb->add_option("--grid", a->grid, "Resample onto a grid of angles: small, default, fine, or a JSON file");
+  add_repeatable(*verb, "--set", a->settings, "AXIS=VALUE: one row of a table with parameter axes (repeatable)");
+  verb->callback([&context, a] {
+    const FileFormat format = a->format.empty() ? format_of_extension(a->output) : parse_output_format(a->format);
+    OutputFile output(a->output, context.force);
+    BrdfFile file = read_brdf_file(a->file.name, a->file.read_options());
+    if (!a->settings.empty()) file = file.row_slice(find_row(file.table, a->settings));
+    if (!a->grid.empty()) {
+      file = {.format = file.format, .table = file.resampled(Grid::named_or_file(a->grid)), .rgl = nullptr};
+    }
+    if (file.table.version.empty()) file.table.version = LOBEFIT_VERSION;
+    file.table.command += (file.table.command.empty() ? "" : " && ") + context.command;
+    write_brdf_file(file, format, output.temporary());
+    output.commit();
+    const auto name = [](FileFormat f) { return file_format_names[static_cast<std::size_t>(f)]; };
+    if (context.json) {
+      std::cout << Json{{"file", a->output}, {"from", name(file.format)}, {"to", name(format)}}.dump(2) << "\n";
+    } else {
+      fmt::print("{}: {}, from {} with {} entries ({} masked)\n", a->output, name(format), name(file.format),
+                 file.table.entries(), file.table.masked());
+    }
+  });
 }
 
 void add_merge(CLI::App& tables, Context& context) {
@@ -213,11 +304,12 @@ void add_recolor(CLI::App& tables, Context& context) {
 }  // namespace
 
 void add_table(CLI::App& app, Context& context) {
-  CLI::App* verb = app.add_subcommand("table", "Look into tables, join and recolour them: info, slice, compare, …");
+  CLI::App* verb = app.add_subcommand("table", "Look into tables and measured files, convert, join and recolour them");
   verb->require_subcommand(1);
   add_info(*verb, context);
   add_slice(*verb, context);
   add_compare(*verb, context);
+  add_convert(*verb, context);
   add_merge(*verb, context);
   add_recolor(*verb, context);
   for (CLI::App* part : verb->get_subcommands([](const CLI::App*) { return true; })) part->fallthrough();

@@ -57,13 +57,16 @@ std::vector<WeightFactor> parse_weights(std::string_view text) {
 }
 
 std::vector<double> entry_weights(const Table& table, const std::vector<WeightFactor>& factors, Quantity quantity) {
-  const std::vector<double> weights_i = table.grid.theta_i.weights(), weights_o = table.grid.theta_o.weights(),
-                            weights_phi = table.grid.phi.weights();
+  const bool wants_quadrature = std::find(factors.begin(), factors.end(), WeightFactor::quadrature) != factors.end();
+  const std::vector<double> quadrature = wants_quadrature ? table.quadrature_weights() : std::vector<double>();
+  const bool spherical = table.coordinates == Coordinates::spherical;
   std::vector<double> weights(table.entries(), 0.0);
   for (std::size_t entry = 0; entry < weights.size(); ++entry) {
     if (!table.valid[entry]) continue;
     const std::size_t i = table.theta_i_index(entry), o = table.theta_o_index(entry);
-    const double theta_i = radians(table.grid.theta_i.values[i]), theta_o = radians(table.grid.theta_o.values[o]);
+    const auto polar = [](const Direction& w) { return std::atan2(std::hypot(w.x, w.y), w.z); };
+    const double theta_i = spherical ? radians(table.grid.theta_i.values[i]) : polar(table.wi(entry));
+    const double theta_o = spherical ? radians(table.grid.theta_o.values[o]) : polar(table.wo(entry));
     double weight = 1.0;
     for (const WeightFactor factor : factors) {
       switch (factor) {
@@ -71,9 +74,7 @@ std::vector<double> entry_weights(const Table& table, const std::vector<WeightFa
         case WeightFactor::sin_theta_o: weight *= std::sin(theta_o); break;
         case WeightFactor::cos_theta_i: weight *= std::cos(theta_i); break;
         case WeightFactor::cos_theta_o: weight *= std::cos(theta_o); break;
-        case WeightFactor::quadrature:
-          weight *= weights_i[i] * weights_o[o] * weights_phi[table.phi_index(entry)];
-          break;
+        case WeightFactor::quadrature: weight *= quadrature[entry]; break;
         case WeightFactor::inverse_variance: {
           double variance = 0.0;
           for (int c = 0; c < table.channels; ++c) {

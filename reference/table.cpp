@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "models/error.h"
 #include "models/parameter.h"
@@ -107,6 +108,10 @@ void Table::allocate() {
   values.assign(count, 0.0f);
   stderr_values.assign(count, 0.0f);
   valid.assign(entries(), 1);
+  if (coordinates == Coordinates::list) {
+    directions.assign(6 * entries(), 0.0f);
+    measure.assign(entries(), 0.0f);
+  }
   order_values.assign(static_cast<std::size_t>(orders) * entries(), 0.0f);
   order_stderr.assign(order_values.size(), 0.0f);
 }
@@ -134,6 +139,11 @@ std::vector<Plane> Table::planes() {
     }
   }
   if (!sample_counts.empty()) result.push_back({"samples", sample_counts.data()});
+  if (coordinates == Coordinates::list) {
+    constexpr std::array<const char*, 6> names{"wi.x", "wi.y", "wi.z", "wo.x", "wo.y", "wo.z"};
+    for (std::size_t k = 0; k < names.size(); ++k) result.push_back({names[k], directions.data() + k * entries()});
+    result.push_back({"measure", measure.data()});
+  }
   return result;
 }
 
@@ -145,21 +155,105 @@ void Table::mask_what_is_not_finite(std::size_t first, std::size_t n) {
   }
 }
 
+HalfDifference HalfDifference::of(const Direction& wi, const Direction& wo) {
+  const Direction h = normalize(wi + wo);
+  const double sin_h = std::hypot(h.x, h.y);
+  // Azimuth of h; any where it is the normal.
+  const double cos_phi = sin_h > 0.0 ? h.x / sin_h : 1.0, sin_phi = sin_h > 0.0 ? h.y / sin_h : 0.0;
+  // The light seen from the half vector: turned by -phi_h about the normal, then by -theta_h about y.
+  const double x = cos_phi * wi.x + sin_phi * wi.y, y = cos_phi * wi.y - sin_phi * wi.x;
+  const double dx = h.z * x - sin_h * wi.z, dz = sin_h * x + h.z * wi.z;
+  double phi_d = std::atan2(y, dx);
+  if (phi_d < 0.0) phi_d += pi;
+  if (phi_d >= pi) phi_d -= pi;
+  return {std::atan2(sin_h, h.z), std::atan2(std::hypot(dx, y), dz), phi_d};
+}
+
+Direction HalfDifference::wi() const {
+  const Direction d = direction(theta_d, phi_d);
+  return {std::cos(theta_h) * d.x + std::sin(theta_h) * d.z, d.y, std::cos(theta_h) * d.z - std::sin(theta_h) * d.x};
+}
+
+Direction HalfDifference::wo() const {
+  // The light mirrored at the half vector is d turned by half a circle about it.
+  return HalfDifference{theta_h, theta_d, phi_d + pi}.wi();
+}
+
+namespace {
+
+HalfDifference half_difference(const Table& table, std::size_t entry) {
+  return {radians(table.grid.theta_o.values[table.theta_o_index(entry)]),
+          radians(table.grid.theta_i.values[table.theta_i_index(entry)]),
+          radians(table.grid.phi.values[table.phi_index(entry)])};
+}
+
+Direction from_planes(const std::vector<float>& planes, std::size_t entries, std::size_t first, std::size_t entry) {
+  return normalize(Direction{planes[first * entries + entry], planes[(first + 1) * entries + entry],
+                             planes[(first + 2) * entries + entry]});
+}
+
+}  // namespace
+
 Direction Table::wi(std::size_t entry) const {
+  if (coordinates == Coordinates::rusinkiewicz) return half_difference(*this, entry).wi();
+  if (coordinates == Coordinates::list) return from_planes(directions, entries(), 0, entry);
   return direction(radians(grid.theta_i.values[theta_i_index(entry)]), radians(grid.phi.values[phi_index(entry)]));
 }
 
 Direction Table::wo(std::size_t entry) const {
+  if (coordinates == Coordinates::rusinkiewicz) return half_difference(*this, entry).wo();
+  if (coordinates == Coordinates::list) return from_planes(directions, entries(), 3, entry);
   return direction(radians(grid.theta_o.values[theta_o_index(entry)]), 0.0);
 }
 
+void Table::set_directions(std::size_t entry, const Direction& wi, const Direction& wo) {
+  const std::array<double, 6> all{wi.x, wi.y, wi.z, wo.x, wo.y, wo.z};
+  for (std::size_t k = 0; k < all.size(); ++k) directions[k * entries() + entry] = static_cast<float>(all[k]);
+}
+
+std::vector<double> Table::quadrature_weights() const {
+  const std::vector<double> weights_i = grid.theta_i.weights(), weights_o = grid.theta_o.weights(),
+                            weights_phi = grid.phi.weights();
+  std::vector<double> weights(entries());
+  for (std::size_t entry = 0; entry < weights.size(); ++entry) {
+    const double cell =
+        weights_i[theta_i_index(entry)] * weights_o[theta_o_index(entry)] * weights_phi[phi_index(entry)];
+    if (coordinates == Coordinates::spherical) {
+      weights[entry] = cell;
+      continue;
+    }
+    const double sines = measured_sine(wi(entry)) * measured_sine(wo(entry));
+    if (coordinates == Coordinates::list) {
+      weights[entry] = measure[entry] / sines;
+      continue;
+    }
+    // d omega_i d omega_o = 4 cos(theta_d) d omega_h d omega_d.
+    const HalfDifference angles = half_difference(*this, entry);
+    weights[entry] =
+        cell * 4.0 * std::cos(angles.theta_d) * std::sin(angles.theta_d) * std::sin(angles.theta_h) / sines;
+  }
+  return weights;
+}
+
+bool Table::same_grid(const Table& other) const {
+  return coordinates == other.coordinates && describe()["axes"] == other.describe()["axes"] &&
+         directions == other.directions;
+}
+
 std::string Table::place(std::size_t entry) const {
+  if (coordinates != Coordinates::spherical) {
+    const auto angles = [](const Direction& w) {
+      return number_text(degrees(std::acos(std::clamp(w.z, -1.0, 1.0)))) + "," +
+             number_text(degrees(std::atan2(w.y, w.x)));
+    };
+    return "entry " + std::to_string(entry) + ", wi " + angles(wi(entry)) + ", wo " + angles(wo(entry));
+  }
   std::string text = "theta_i " + number_text(grid.theta_i.values[theta_i_index(entry)]) + ", theta_o " +
                      number_text(grid.theta_o.values[theta_o_index(entry)]) + ", phi " +
                      number_text(grid.phi.values[phi_index(entry)]);
-  const std::vector<double> coordinates = parameter_values(parameter_row(entry));
-  for (std::size_t i = 0; i < coordinates.size(); ++i) {
-    text += ", " + parameter_axes[i].name + " " + number_text(coordinates[i]);
+  const std::vector<double> row_values = parameter_values(parameter_row(entry));
+  for (std::size_t i = 0; i < row_values.size(); ++i) {
+    text += ", " + parameter_axes[i].name + " " + number_text(row_values[i]);
   }
   return text;
 }
@@ -175,6 +269,9 @@ std::vector<double> Table::parameter_values(std::size_t row) const {
 
 Table Table::with_values(const std::string& name, std::vector<float> other) const {
   Table result;
+  result.coordinates = coordinates;
+  result.directions = directions;
+  result.measure = measure;
   result.grid = grid;
   result.parameter_axes = parameter_axes;
   result.channels = channels;
@@ -188,7 +285,88 @@ Table Table::with_values(const std::string& name, std::vector<float> other) cons
   return result;
 }
 
+Rgb Table::interpolate_half_difference(std::size_t row, const Direction& light, const Direction& view) const {
+  if (!(light.z > 0.0 && view.z > 0.0)) {
+    throw Error(ExitCode::usage, "a direction lies under the surface", "", "choose angles below 90 degrees");
+  }
+  const HalfDifference angles = HalfDifference::of(light, view);
+  struct Place {
+    std::size_t below, above;
+    double fraction;
+  };
+  // Outside the outermost values, theirs; an angle with a period goes from the last on to the first.
+  const auto locate = [](const Axis& axis, double angle, double period) -> Place {
+    const std::size_t last = axis.size() - 1;
+    const auto next =
+        static_cast<std::size_t>(std::upper_bound(axis.values.begin(), axis.values.end(), angle) - axis.values.begin());
+    if (next > 0 && next <= last) {
+      return {next - 1, next, (angle - axis.values[next - 1]) / (axis.values[next] - axis.values[next - 1])};
+    }
+    if (period == 0.0) return next == 0 ? Place{0, 0, 0.0} : Place{last, last, 0.0};
+    const double gap = axis.values.front() + period - axis.values.back();
+    return {last, 0, (next == 0 ? angle + period - axis.values.back() : angle - axis.values.back()) / gap};
+  };
+  const Place h = locate(grid.theta_o, degrees(angles.theta_h), 0.0),
+              d = locate(grid.theta_i, degrees(angles.theta_d), 0.0),
+              k = locate(grid.phi, degrees(angles.phi_d), 180.0);
+  std::array<double, 3> sum{};
+  double total = 0.0;
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const auto step = [&](const Place& place, std::size_t bit) {
+      return (corner >> bit & 1) != 0 ? place.fraction : 1.0 - place.fraction;
+    };
+    const auto index = [&](const Place& place, std::size_t bit) {
+      return (corner >> bit & 1) != 0 ? place.above : place.below;
+    };
+    const std::size_t entry =
+        (row * lines_per_parameter() + index(h, 0)) * width() + index(d, 1) * grid.phi.size() + index(k, 2);
+    const double weight = step(h, 0) * step(d, 1) * step(k, 2);
+    constexpr double least = 1e-9;  // angles that went through a direction: a bin's own centre is not its neighbour's
+    if (weight < least || !valid[entry]) continue;
+    total += weight;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * value(entry, channels == 3 ? static_cast<int>(c) : 0);
+  }
+  if (total == 0.0) throw Error(ExitCode::usage, "the table is masked there", "", "choose other angles");
+  return {sum[0] / total, sum[1] / total, sum[2] / total};
+}
+
+Rgb Table::nearest_of_list(std::size_t row, const Direction& light, const Direction& view) const {
+  const auto isotropic = parameters.find("isotropic");
+  const bool turns = isotropic != parameters.end() && *isotropic == true;
+  const std::size_t count = width() * lines_per_parameter();
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  const double light_sine = std::hypot(light.x, light.y);
+  for (std::size_t entry = row * count; entry < (row + 1) * count; ++entry) {
+    if (!valid[entry]) continue;
+    const Direction there_i = wi(entry), there_o = wo(entry);
+    Direction here_i = light, here_o = view;
+    const double there_sine = std::hypot(there_i.x, there_i.y);
+    if (turns && light_sine > 0.0 && there_sine > 0.0) {
+      // The pair turned about the normal so that both lights have one azimuth.
+      const double c = (light.x * there_i.x + light.y * there_i.y) / (light_sine * there_sine);
+      const double s = (light.x * there_i.y - light.y * there_i.x) / (light_sine * there_sine);
+      here_i = {c * light.x - s * light.y, s * light.x + c * light.y, light.z};
+      here_o = {c * view.x - s * view.y, s * view.x + c * view.y, view.z};
+    }
+    const Direction apart_i = here_i - there_i, apart_o = here_o - there_o;
+    const double distance = dot(apart_i, apart_i) + dot(apart_o, apart_o);
+    if (distance < least) {
+      least = distance;
+      best = entry;
+    }
+  }
+  constexpr double farthest = 0.1;  // radians, about 6 degrees: beyond it the file says nothing
+  if (!(least < farthest * farthest)) {
+    throw Error(ExitCode::usage, "the table has no entry near these directions", "",
+                "`lobefit table slice` lists its entries");
+  }
+  return {value(best, 0), value(best, channels == 3 ? 1 : 0), value(best, channels == 3 ? 2 : 0)};
+}
+
 Rgb Table::interpolate(std::size_t row, const Direction& light, const Direction& view) const {
+  if (coordinates == Coordinates::rusinkiewicz) return interpolate_half_difference(row, light, view);
+  if (coordinates == Coordinates::list) return nearest_of_list(row, light, view);
   struct Place {
     std::size_t index;
     double fraction;
@@ -272,8 +450,8 @@ Table Table::with_albedo(const Rgb& albedo) const {
 
 Table Table::row_slice(std::size_t row) const {
   Table slice = *this;
-  const std::vector<double> coordinates = parameter_values(row);
-  for (std::size_t i = 0; i < parameter_axes.size(); ++i) slice.parameters[parameter_axes[i].name] = coordinates[i];
+  const std::vector<double> row_values = parameter_values(row);
+  for (std::size_t i = 0; i < parameter_axes.size(); ++i) slice.parameters[parameter_axes[i].name] = row_values[i];
   slice.parameter_axes.clear();
   slice.shards = {};  // shards count lines of the whole table
   const std::size_t count = slice.entries(), first = row * count;
@@ -292,6 +470,8 @@ Table Table::row_slice(std::size_t row) const {
   cut(order_stderr, slice.order_stderr);
   cut(order_replicates, slice.order_replicates);
   cut(valid, slice.valid);
+  cut(directions, slice.directions);
+  cut(measure, slice.measure);
   return slice;
 }
 
@@ -317,7 +497,7 @@ Json Table::describe() const {
   provenance["version"] = version;
   provenance["command"] = command;
   return {{"axes", axes},
-          {"coordinates", "spherical"},
+          {"coordinates", coordinates_names[static_cast<std::size_t>(coordinates)]},
           {"quantity", "brdf 1/sr"},
           {"channels", channels == 1 ? Json{"Y"} : Json{"R", "G", "B"}},
           {"entries", entries()},

@@ -3,12 +3,19 @@
 // A table is a picture. Column x = i_phi + Nphi i_theta_i, line y = i_theta_o + Ntheta_o i_parameter, the parameter
 // axes flattened with the last running fastest. Values are BRDFs in 1/sr without cosine, 32-bit float, each with a
 // standard error (0 where exact) and a mask. Tables whose entries have correlated errors keep their replicates.
+//
+// Measured files keep their own grids: the three axes are then others (`rusinkiewicz`: theta_h, theta_d, phi_d in the
+// places of theta_o, theta_i, phi) or mere counters of a `list` that holds the directions of each entry.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "models/geometry.h"
@@ -43,6 +50,24 @@ struct Grid {
   static Grid from_json(const JsonReader& reader, bool sphere = false);
 };
 
+/// How a table's three axes give directions.
+enum class Coordinates { spherical, rusinkiewicz, list };
+inline constexpr std::array<std::string_view, 3> coordinates_names{"spherical", "rusinkiewicz", "list"};
+
+/// Angles of half and difference vector (Rusinkiewicz 1998) in radians, of a pair that may turn about the normal and
+/// whose directions may change places: phi_d in [0, pi).
+struct HalfDifference {
+  double theta_h, theta_d, phi_d;
+
+  static HalfDifference of(const Direction& wi, const Direction& wo);
+  /// The pair with the half vector at azimuth 0; either may lie under the surface.
+  Direction wi() const;
+  Direction wo() const;
+};
+
+/// Sines by which a list's measure is made and divided, kept off 0.
+inline double measured_sine(const Direction& w) { return std::max(std::hypot(w.x, w.y), 1e-3); }
+
 /// One named plane of a table's picture.
 struct Plane {
   std::string name;
@@ -50,6 +75,7 @@ struct Plane {
 };
 
 struct Table {
+  Coordinates coordinates = Coordinates::spherical;
   Grid grid;
   std::vector<Axis> parameter_axes;
   int channels = 1;    // 1 (Y) or 3 (R, G, B)
@@ -74,6 +100,9 @@ struct Table {
   std::vector<float> order_stderr;      // [order][entry]
   std::vector<float> order_replicates;  // [replicate][order][entry] where replicates are kept
   std::vector<std::uint8_t> valid;      // [entry]
+  // Of a list alone. Directions are kept as files hold them and normalised on the way out.
+  std::vector<float> directions;  // [wi.x wi.y wi.z wo.x wo.y wo.z][entry]
+  std::vector<float> measure;     // [entry]: d omega_i d omega_o of quadrature, with measured_sine() for the sines
 
   std::size_t width() const { return grid.phi.size() * grid.theta_i.size(); }
   std::size_t lines_per_parameter() const { return grid.theta_o.size(); }
@@ -110,9 +139,14 @@ struct Table {
   std::size_t theta_o_index(std::size_t entry) const { return entry / width() % lines_per_parameter(); }
   std::size_t theta_i_index(std::size_t entry) const { return entry % width() / grid.phi.size(); }
   std::size_t phi_index(std::size_t entry) const { return entry % grid.phi.size(); }
-  /// The view lies in the plane of azimuth 0, the light at azimuth phi.
+  /// Spherical: the view lies in the plane of azimuth 0, the light at azimuth phi. Bins of measured grids may have
+  /// directions under the surface; they are masked.
   Direction wi(std::size_t entry) const;
   Direction wo(std::size_t entry) const;
+  void set_directions(std::size_t entry, const Direction& wi, const Direction& wo);
+  /// Quadrature weights of all entries but for sin(theta_i) sin(theta_o): products of the axes' weights in degrees
+  /// where the coordinates are spherical.
+  std::vector<double> quadrature_weights() const;
   /// Where an entry lies: `theta_i 30, theta_o 0, phi 180, alpha 0.5`.
   std::string place(std::size_t entry) const;
   /// Values of the parameter axes in one row.
@@ -120,9 +154,12 @@ struct Table {
 
   /// The same grid with other values and no errors, rendered from `name`.
   Table with_values(const std::string& name, std::vector<float> other) const;
-  /// Value and error at any pair of directions: linear in the angles between grid points. Throws Error(usage) outside
-  /// the grid's angles, and where the row's neighbours are masked.
+  /// Value at any pair of directions: linear in the angles between grid points, among the neighbours that are not
+  /// masked on a Rusinkiewicz grid; the nearest entry of a list. Throws Error(usage) outside the grid's angles, and
+  /// where neighbours are masked.
   Rgb interpolate(std::size_t row, const Direction& light, const Direction& view) const;
+  /// Whether both tables have the same entries at the same places.
+  bool same_grid(const Table& other) const;
   /// The table of one parameter row alone, without parameter axes.
   Table row_slice(std::size_t row) const;
 
@@ -131,6 +168,12 @@ struct Table {
   /// Reads what write() wrote; throws Error(invalid_input) naming the file and what is wrong in it.
   static Table read(const std::filesystem::path& path);
   Json describe() const;
+
+ private:
+  Rgb interpolate_half_difference(std::size_t row, const Direction& light, const Direction& view) const;
+  Rgb nearest_of_list(std::size_t row, const Direction& light, const Direction& view) const;
+
+ public:
   /// What determines every bit of the values: tables that agree in it are parts of one render. Neither the command as
   /// it was given nor the shards.
   Json fingerprint() const;

@@ -7,8 +7,10 @@
 #include <OpenEXR/ImfStdIO.h>
 #include <OpenEXR/ImfStringAttribute.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -110,9 +112,11 @@ Table Table::read(const std::filesystem::path& path) {
       return std::stoull(text);
     };
     const std::string coordinates = attribute("coordinates");
-    if (coordinates != "spherical") throw invalid(path, "unknown coordinates '" + coordinates + "'");
+    const auto known = std::find(coordinates_names.begin(), coordinates_names.end(), coordinates);
+    if (known == coordinates_names.end()) throw invalid(path, "unknown coordinates '" + coordinates + "'");
 
     Table table;
+    table.coordinates = static_cast<Coordinates>(known - coordinates_names.begin());
     const std::string axes_place = path.string() + ", lobefit:axes";
     const Json axes = parse_json(attribute("axes"), axes_place);
     for (const JsonReader& reader : JsonReader(axes, axes_place).elements()) {
@@ -120,6 +124,10 @@ Table Table::read(const std::filesystem::path& path) {
                 reader.at("kind").text() == "midpoints"};
       if (!axis.midpoints && reader.at("kind").text() != "points") {
         throw reader.at("kind").error("unknown kind of axis", "write points or midpoints");
+      }
+      if (table.coordinates != Coordinates::spherical) {
+        table.parameter_axes.push_back(axis);
+        continue;
       }
       if (axis.name == "theta_i" || axis.name == "theta_o") check_angles(reader.at("values"), 180.0, true);
       if (axis.name == "phi") check_angles(reader.at("values"), 360.0, false);
@@ -131,6 +139,20 @@ Table Table::read(const std::filesystem::path& path) {
         table.grid.phi = axis;
       else
         table.parameter_axes.push_back(axis);
+    }
+    if (table.coordinates != Coordinates::spherical && table.parameter_axes.size() >= 3) {
+      // The last three stand for the grid's own.
+      table.grid.phi = table.parameter_axes.back();
+      table.parameter_axes.pop_back();
+      table.grid.theta_i = table.parameter_axes.back();
+      table.parameter_axes.pop_back();
+      table.grid.theta_o = table.parameter_axes.back();
+      table.parameter_axes.pop_back();
+    }
+    if (table.coordinates == Coordinates::rusinkiewicz &&
+        (table.grid.theta_o.name != "theta_h" || table.grid.theta_i.name != "theta_d" ||
+         table.grid.phi.name != "phi_d")) {
+      throw invalid(path, "lobefit:coordinates is rusinkiewicz, but the last axes are not theta_h, theta_d, phi_d");
     }
     if (table.grid.theta_i.size() * table.grid.theta_o.size() * table.grid.phi.size() == 0) {
       throw invalid(path, "lobefit:axes lacks theta_i, theta_o or phi");
@@ -194,6 +216,13 @@ Table Table::read(const std::filesystem::path& path) {
     file.readPixels(0, static_cast<int>(table.height()) - 1);
     for (std::size_t i = 0; i < mask.size(); ++i) table.valid[i] = mask[i] != 0.0f ? 1 : 0;
     table.mask_what_is_not_finite(0, table.entries());
+    for (std::size_t k = 0; k < table.directions.size(); k += 3 * table.entries()) {
+      for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+        const float* w = table.directions.data() + k + entry;
+        const double length = std::hypot(w[0], w[table.entries()], w[2 * table.entries()]);
+        if (!(std::abs(length - 1.0) < 1e-3)) table.valid[entry] = 0;  // no direction
+      }
+    }
     return table;
   } catch (const Error&) {
     throw;

@@ -72,6 +72,8 @@ TableModel::TableModel(const Model& model, const ParameterValues& values, const 
 Table TableModel::render() const {
   std::vector<float> values(table_->values.size());
   for (std::size_t entry = 0; entry < table_->entries(); ++entry) {
+    // Bins of measured grids may lie under the surface, where models have no value.
+    if (table_->coordinates != Coordinates::spherical && !table_->valid[entry]) continue;
     const Rgb f = evaluate(entry);
     const std::array<double, 3> components{f.x, f.y, f.z};
     for (std::size_t c = 0; c < static_cast<std::size_t>(table_->channels); ++c) {

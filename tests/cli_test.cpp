@@ -407,4 +407,27 @@ TEST_F(CommandLine, ReadingAnUnfinishedRecipeNamesTheJsonPath) {
   expect_refused("refit s.json -o out", 3, {"s.json, line 1"});
 }
 
+TEST_F(CommandLine, MeasuredFilesAreTables) {
+  std::ofstream(folder_ / "tape.dat") << "#DIM 3 1\n#VS 0\n#PARAM_IN ISOTROPIC_TL_TV_PROJ_DPHI\n"
+                                         "#PARAM_OUT INV_STERADIAN\n0.5 0.5 0 0.25\n0.5 -0.5 0 0.125\n0.5 0 0.5 0.25\n";
+  const Json info = json("table info tape.dat");
+  EXPECT_EQ(info["format"], "alta");
+  EXPECT_EQ(info["coordinates"], "list");
+  EXPECT_EQ(info["entries"], 3);
+  EXPECT_EQ(json("eval tape.dat --wi 28.6479,10 --wo 28.6479,10")["values"][0]["f"], Json::array({0.25}));
+  EXPECT_EQ(run("table convert tape.dat -o tape.exr").code, 0);
+  EXPECT_EQ(json("table info tape.exr")["entries"], 3);
+  EXPECT_EQ(json("table compare tape.dat tape.exr --tolerance 1e-7")["passed"], true);
+  EXPECT_EQ(run("table convert tape.exr -o tape.csv").code, 0);
+  EXPECT_TRUE(content(folder_ / "tape.csv").starts_with("theta_i,phi_i,theta_o,phi_o,f\n"));
+  // 0.25 twice and 0.125: by least squares in f the albedo is π times their mean.
+  const Json fit = json("fit lambert tape.dat --metric brdf");
+  EXPECT_NEAR(fit["params"][0]["value"].get<double>(), 3.14159265 * 0.625 / 3.0, 1e-6);
+  expect_refused("table convert tape.dat -o tape.bsdf", 2, {"RGL files alone"});
+  expect_refused("table convert tape.dat -o tape.xyz", 2, {".binary"});
+  std::ofstream(folder_ / "broken.bsdf") << std::string("tensor_file\0\1\0\1", 15);
+  expect_refused("table info broken.bsdf", 3, {"byte 14", "truncated"});
+  expect_refused("fit lambert broken.bsdf -o fit.json", 3, {"broken.bsdf"});
+}
+
 }  // namespace
