@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "cli/output_folder.h"
+#include "cli/refit_curves.h"
 #include "cli/shader_text.h"
 #include "evaluate/check.h"
 #include "evaluate/shader.h"
@@ -172,8 +173,8 @@ bool check_fits(const RecipeResult& result, const Context& context, Monitor& mon
   return passed;
 }
 
-bool run(const std::string& name, const std::string& output, const Context& context) {
-  const Recipe recipe = Recipe::read(find_recipe(name));
+void refit_constants(const fs::path& path, const std::string& output, const Context& context) {
+  const Recipe recipe = Recipe::read(path);
   OutputFolder folder(output.empty() ? fs::path("out") / recipe.name : fs::path(output), context.force);
   const auto monitor = context.monitor();
   RecipeResult result = run_recipe(recipe, context.seed, *monitor);
@@ -227,7 +228,14 @@ bool run(const std::string& name, const std::string& output, const Context& cont
     throw Error(ExitCode::check_failed, "a fitted model in float strays from double precision",
                 folder.destination().string(), "see \"checks\" in result.json");
   }
-  return passed;
+}
+
+void run(const std::string& name, const std::string& output, const Context& context) {
+  const fs::path path = find_recipe(name);
+  switch (recipe_kind(path)) {
+    case RecipeKind::constants: return refit_constants(path, output, context);
+    case RecipeKind::curves: return refit_curves(path, output, context);
+  }
 }
 
 }  // namespace

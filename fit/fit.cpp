@@ -22,6 +22,12 @@ struct Variables {
 
 constexpr std::array<const char*, 3> channel_suffixes{".r", ".g", ".b"};
 
+/// Where a fit may move a parameter.
+FitBounds bounds_of(const ParameterInfo& info, const FitOptions& options) {
+  const auto given = std::ranges::find(options.bounds, info.name, &FitBounds::name);
+  return given != options.bounds.end() ? *given : FitBounds{std::string(info.name), info.lower, info.upper};
+}
+
 Variables make_variables(const ParameterValues& values, const TableModel& on_table, const FitOptions& options,
                          int channels) {
   Variables variables;
@@ -41,8 +47,9 @@ Variables make_variables(const ParameterValues& values, const TableModel& on_tab
       const std::size_t slot = offset + static_cast<std::size_t>(c);
       if (c == 0 || per_channel) {
         variables.names.push_back(name + (per_channel ? channel_suffixes[static_cast<std::size_t>(c)] : ""));
-        variables.lower.push_back(info.lower);
-        variables.upper.push_back(info.upper);
+        const FitBounds bounds = bounds_of(info, options);
+        variables.lower.push_back(bounds.lower);
+        variables.upper.push_back(bounds.upper);
         variables.start.push_back(values.flat()[slot]);
       }
       variables.variable_of_slot[slot] = static_cast<int>(variables.names.size()) - 1;
@@ -126,6 +133,7 @@ class TableProblem {
     result.lower = variables_.lower;
     result.upper = variables_.upper;
     result.start = std::move(start);
+    result.maximum_iterations = options_.maximum_iterations;
     result.evaluate = [this](std::span<const double> x, std::span<double> residuals, double* jacobian) {
       return evaluate(x, residuals, jacobian);
     };
@@ -344,8 +352,10 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
         (fitted.flat()[offset] == fitted.flat()[offset + 1] && fitted.flat()[offset] == fitted.flat()[offset + 2] &&
          variables.variable_of_slot[offset] == variables.variable_of_slot[offset + 1]);
     for (std::size_t c = 0; c < (grey ? 1u : 3u); ++c) {
-      FitParameter parameter{
-          .name = std::string(info.name) + (grey ? "" : channel_suffixes[c]), .lower = info.lower, .upper = info.upper};
+      const FitBounds bounds = bounds_of(info, options);
+      FitParameter parameter{.name = std::string(info.name) + (grey ? "" : channel_suffixes[c]),
+                             .lower = bounds.lower,
+                             .upper = bounds.upper};
       const int variable = variables.variable_of_slot[offset + c];
       parameter.free = variable >= 0;
       if (parameter.free) {

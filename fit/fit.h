@@ -22,14 +22,22 @@ namespace lobefit {
 enum class Loss { none, huber, cauchy };
 inline constexpr std::array<std::string_view, 3> loss_names{"none", "huber", "cauchy"};
 
+/// Bounds of a free parameter in the place of its own range.
+struct FitBounds {
+  std::string name;
+  double lower, upper;
+};
+
 struct FitOptions {
   std::vector<std::string> free;
+  std::vector<FitBounds> bounds;  // wider than a parameter's range: Fit::values() refuses what lies outside of that
   std::vector<AxisMapping> mappings;
   Quantity quantity = Quantity::log;
   std::vector<WeightFactor> weights;
   Loss loss = Loss::none;
   double loss_scale = 0.05;
-  int starts = 1;          // > 1: further starts from a scrambled Sobol sequence over the ranges
+  int starts = 1;  // > 1: further starts from a scrambled Sobol sequence over the ranges
+  int maximum_iterations = 200;
   double holdout = 0.0;    // fraction of entries kept out of the fit to be scored
   std::uint64_t seed = 1;  // of starts and held-out entries
 };

@@ -26,6 +26,17 @@ class Cache : public ceres::EvaluationCallback {
         residuals(problem.residual_count),
         jacobian(problem.residual_count * problem.names.size()) {}
 
+  /// -1 or 1 where variable i is at its lower or upper bound and the cost would fall beyond it; 0 elsewhere. Needs the
+  /// Jacobian at the current point.
+  int pressed(std::size_t i) const {
+    const int side = x_[i] <= problem_.lower[i] ? -1 : x_[i] >= problem_.upper[i] ? 1 : 0;
+    if (side == 0) return 0;
+    const std::size_t variables = problem_.names.size();
+    double gradient = 0.0;
+    for (std::size_t row = 0; row < residuals.size(); ++row) gradient += residuals[row] * jacobian[row * variables + i];
+    return side * gradient < 0.0 ? side : 0;
+  }
+
   void PrepareForEvaluation(bool jacobians, bool new_point) override {
     if (new_point) has_residuals_ = has_jacobian_ = false;
     if (has_residuals_ && (has_jacobian_ || !jacobians)) return;
@@ -78,16 +89,23 @@ class Block : public ceres::CostFunction {
   std::size_t first_, count_, variables_;
 };
 
-/// Stops the solver when the user asks, or when an evaluation has failed.
-class StopOnFailure : public ceres::IterationCallback {
+/// Stops the solver when the user asks, when an evaluation has failed, or when a variable is pressed against a bound
+/// that does not hold it yet.
+class Watch : public ceres::IterationCallback {
  public:
-  explicit StopOnFailure(const Cache& cache) : cache_(cache) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return cache_.failure ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  Watch(const Cache& cache, const std::vector<int>& held) : cache_(cache), held_(held) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
+    if (cache_.failure) return ceres::SOLVER_ABORT;
+    if (!iteration.step_is_successful) return ceres::SOLVER_CONTINUE;
+    for (std::size_t i = 0; i < held_.size(); ++i) {
+      if (held_[i] == 0 && cache_.pressed(i) != 0) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
+    }
+    return ceres::SOLVER_CONTINUE;
   }
 
  private:
   const Cache& cache_;
+  const std::vector<int>& held_;
 };
 
 /// Names the direction v of variable space: "0.8 a - 0.6 b".
@@ -266,37 +284,68 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor)
   std::vector<double> x = problem.start;
   if (variables > 0) {
     Cache cache(problem, x.data(), monitor);
-    ceres::Problem::Options problem_options;
-    problem_options.evaluation_callback = &cache;
-    ceres::Problem ceres_problem(problem_options);
-    for (std::size_t first = 0; first < problem.residual_count; first += residuals_per_block) {
-      const std::size_t count = std::min(residuals_per_block, problem.residual_count - first);
-      ceres_problem.AddResidualBlock(new Block(cache, first, count, variables), nullptr, x.data());
+    // Ceres steps into a bound and projects; with the bound pressed against, its steps shrink until it takes standing
+    // still for convergence. So a variable that the cost presses against its bound is held there, and let go once the
+    // cost falls inwards.
+    std::vector<int> held(variables, 0);
+    const auto most_passes = static_cast<int>(4 * variables + 4);
+    for (int pass = 0; pass < most_passes; ++pass) {
+      ceres::Problem::Options problem_options;
+      problem_options.evaluation_callback = &cache;
+      ceres::Problem ceres_problem(problem_options);
+      for (std::size_t first = 0; first < problem.residual_count; first += residuals_per_block) {
+        const std::size_t count = std::min(residuals_per_block, problem.residual_count - first);
+        ceres_problem.AddResidualBlock(new Block(cache, first, count, variables), nullptr, x.data());
+      }
+      std::vector<int> constant;
+      for (std::size_t i = 0; i < variables; ++i) {
+        if (held[i] != 0) constant.push_back(static_cast<int>(i));
+        if (std::isfinite(problem.lower[i]))
+          ceres_problem.SetParameterLowerBound(x.data(), static_cast<int>(i), problem.lower[i]);
+        if (std::isfinite(problem.upper[i]))
+          ceres_problem.SetParameterUpperBound(x.data(), static_cast<int>(i), problem.upper[i]);
+      }
+      if (constant.size() == variables) {
+        solution.converged = true;
+        solution.termination = "every variable is held at a bound";
+      } else {
+        if (!constant.empty()) {
+          ceres_problem.SetManifold(x.data(), new ceres::SubsetManifold(static_cast<int>(variables), constant));
+        }
+        ceres::Solver::Options options;
+        // QR keeps the digits that ill-conditioned problems need; large ones are well overdetermined and can spare
+        // them.
+        options.linear_solver_type =
+            problem.residual_count * variables < 4'000'000 ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
+        options.max_num_iterations = std::max(1, problem.maximum_iterations - solution.iterations);
+        options.function_tolerance = 1e-15;
+        options.parameter_tolerance = 1e-13;
+        options.gradient_tolerance = 1e-15;
+        options.num_threads = 1;
+        options.logging_type = ceres::SILENT;
+        options.update_state_every_iteration = true;
+        Watch watch(cache, held);
+        options.callbacks.push_back(&watch);
+        ceres::Solver::Summary summary;
+        ceres::Solve(options, &ceres_problem, &summary);
+        if (cache.failure) std::rethrow_exception(cache.failure);
+        solution.converged =
+            summary.termination_type == ceres::CONVERGENCE || summary.termination_type == ceres::USER_SUCCESS;
+        solution.iterations += summary.num_successful_steps + summary.num_unsuccessful_steps;
+        solution.termination = summary.message;
+        if (!solution.converged || solution.iterations >= problem.maximum_iterations) break;
+      }
+      cache.PrepareForEvaluation(true, true);
+      if (cache.failure) std::rethrow_exception(cache.failure);
+      bool changed = false;
+      for (std::size_t i = 0; i < variables; ++i) {
+        const int side = cache.pressed(i);
+        changed = changed || side != held[i];
+        held[i] = side;
+      }
+      if (!changed) break;
+      solution.converged = false;  // unless the next pass says so
     }
-    for (std::size_t i = 0; i < variables; ++i) {
-      if (std::isfinite(problem.lower[i]))
-        ceres_problem.SetParameterLowerBound(x.data(), static_cast<int>(i), problem.lower[i]);
-      if (std::isfinite(problem.upper[i]))
-        ceres_problem.SetParameterUpperBound(x.data(), static_cast<int>(i), problem.upper[i]);
-    }
-    ceres::Solver::Options options;
-    // QR keeps the digits that ill-conditioned problems need; large ones are well overdetermined and can spare them.
-    options.linear_solver_type =
-        problem.residual_count * variables < 4'000'000 ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
-    options.max_num_iterations = problem.maximum_iterations;
-    options.function_tolerance = 1e-15;
-    options.parameter_tolerance = 1e-13;
-    options.gradient_tolerance = 1e-15;
-    options.num_threads = 1;
-    options.logging_type = ceres::SILENT;
-    StopOnFailure stop(cache);
-    options.callbacks.push_back(&stop);
-    ceres::Solver::Summary summary;
-    ceres::Solve(options, &ceres_problem, &summary);
-    if (cache.failure) std::rethrow_exception(cache.failure);
-    solution.converged = summary.termination_type == ceres::CONVERGENCE;
-    solution.iterations = summary.num_successful_steps + summary.num_unsuccessful_steps;
-    solution.termination = summary.message;
   } else {
     solution.converged = true;
     solution.termination = "nothing was free";

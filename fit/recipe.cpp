@@ -6,43 +6,12 @@
 #include <numeric>
 #include <set>
 
-#include "reference/json_reader.h"
+#include "fit/recipe_reading.h"
 #include "reference/output_file.h"
 
 namespace lobefit {
 
 namespace {
-
-std::vector<double> number_or_numbers(const JsonReader& reader) {
-  return reader.value().is_array() ? reader.numbers() : std::vector{reader.number()};
-}
-
-/// Sets parameters from a JSON object; a wrong name or value is reported with its path.
-void set_parameters(ParameterValues& values, const JsonReader& reader) {
-  for (const auto& [name, member] : reader.members()) {
-    try {
-      if (member.value().is_string()) {
-        values.set_text(name, member.text());
-      } else {
-        values.set(name, number_or_numbers(member));
-      }
-    } catch (const Error& error) {
-      if (error.code() != ExitCode::usage) throw;
-      throw error.inside(ExitCode::invalid_input, member.path());
-    }
-  }
-}
-
-/// Runs `read`, whose complaints about usage become complaints about the place in the file.
-template <class Read>
-auto in_file(const JsonReader& reader, Read&& read) {
-  try {
-    return read();
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::usage) throw;
-    throw error.inside(ExitCode::invalid_input, reader.path());
-  }
-}
 
 Rival read_rival(const JsonReader& reader, const std::vector<Axis>& axes) {
   reader.allow({"label", "model", "set", "map", "free_per_row"});
@@ -210,14 +179,26 @@ std::string conclude(const Recipe& recipe, const std::vector<RecipeResultRow>& r
 
 }  // namespace
 
+RecipeKind recipe_kind(const std::filesystem::path& path) {
+  const Json json = parse_json(read_file(path), path.string());
+  const JsonReader reader(json, path.string());
+  if (!reader.has("kind")) return RecipeKind::constants;
+  const JsonReader kind = reader.at("kind");
+  const auto found = std::ranges::find(recipe_kind_names, kind.text());
+  if (found == recipe_kind_names.end()) {
+    throw kind.error("unknown kind '" + kind.text() + "'", "choose constants or curves");
+  }
+  return static_cast<RecipeKind>(found - recipe_kind_names.begin());
+}
+
 Recipe Recipe::read(const std::filesystem::path& path) {
   const Json json = parse_json(read_file(path), path.string());
   const JsonReader reader(json, path.string());
-  reader.allow({"recipe", "title", "description", "model", "fixed", "published", "axes", "samples", "facets",
+  reader.allow({"recipe", "kind", "title", "description", "model", "fixed", "published", "axes", "samples", "facets",
                 "tolerance", "rivals", "rows"});
   Recipe recipe;
   // Inner readers know their path in the document; the file's name is added here, once.
-  try {
+  return naming_file(path, [&] {
     recipe.name = reader.at("recipe").text();
     recipe.title = reader.at("title").text();
     recipe.description = reader.at("description").text();
@@ -281,12 +262,8 @@ Recipe Recipe::read(const std::filesystem::path& path) {
         });
       }
     }
-  } catch (const Error& error) {
-    const std::string message = error.what();
-    if (message.find(path.string()) != std::string::npos) throw;
-    throw error.inside(error.code(), path.string());
-  }
-  return recipe;
+    return recipe;
+  });
 }
 
 RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monitor) {

@@ -3,6 +3,8 @@
 // A recipe names a closed form with published constants, and rows. A row is a reference over a domain, and the sets of
 // parameters to free on it. Every row is run on a Monte Carlo table and on an exact one; rivals are scored on the same
 // tables. data/recipes/proxima.json is the worked example, data/schemas/recipe.json the schema.
+//
+// Recipes of another kind are in curve_recipe.h.
 #pragma once
 
 #include <filesystem>
@@ -14,6 +16,11 @@
 #include "reference/render.h"
 
 namespace lobefit {
+
+enum class RecipeKind { constants, curves };
+inline constexpr std::array<std::string_view, 2> recipe_kind_names{"constants", "curves"};
+/// What a recipe's "kind" says; without one it is of constants. Throws Error(invalid_input).
+RecipeKind recipe_kind(const std::filesystem::path& path);
 
 /// Another model scored on a row's table: as it is, or with one set of its parameters refitted per parameter row.
 struct Rival {

@@ -405,6 +405,11 @@ TEST_F(CommandLine, ReadingAnUnfinishedRecipeNamesTheJsonPath) {
   expect_refused("refit r.json -o out", 3, {"r.json", "$.rows[0].free[0][1]", "gamma"});
   std::ofstream(folder_ / "s.json") << "{\"recipe\": ";
   expect_refused("refit s.json -o out", 3, {"s.json, line 1"});
+  std::ofstream(folder_ / "k.json") << R"({"recipe":"r","kind":"curvs"})";
+  expect_refused("refit k.json -o out", 3, {"k.json", "$.kind", "curves"});
+  std::ofstream(folder_ / "c.json")
+      << R"({"recipe":"r","kind":"curves","title":"t","description":"d","alpha":[0.5,0.1]})";
+  expect_refused("refit c.json -o out", 3, {"c.json", "$.alpha", "increase"});
 }
 
 TEST_F(CommandLine, MeasuredFilesAreTables) {
