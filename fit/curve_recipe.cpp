@@ -677,15 +677,7 @@ std::string conclude(const CurveRecipe& recipe, const CurveResult& result) {
 Json parameters_json(const Fit& fit) {
   Json json = Json::object();
   for (const FitParameter& p : fit.parameters) {
-    if (!p.free) continue;
-    json[p.name] = {{"value", p.estimate.value},
-                    {"stderr", p.estimate.standard_error},
-                    {"ci95", {p.estimate.ci_low, p.estimate.ci_high}},
-                    {"misfit_stderr", p.estimate.misfit_standard_error},
-                    {"lower", p.lower},
-                    {"upper", p.upper},
-                    {"at_bound", p.estimate.at_bound},
-                    {"identifiable", p.estimate.identifiable}};
+    if (p.free) json[p.name] = estimate_json(p);
   }
   return json;
 }
@@ -744,8 +736,7 @@ CurveRecipe CurveRecipe::read(const std::filesystem::path& path) {
         throw model.at("rival").error("'" + model.at("rival").text() + "' is not among $.models", "choose one of them");
       }
     }
-    const std::vector<std::string> free = read_names(reader.at("free"), recipe);
-    recipe.free = free;
+    recipe.free = read_names(reader.at("free"), recipe);
     if (recipe.free.empty()) throw reader.at("free").error("the list is empty", "name the parameters to fit");
     const JsonReader contested = reader.at("contested");
     contested.allow({"name", "parameters", "claim"});
@@ -864,23 +855,13 @@ std::vector<float> series_values(const CurveRecipe& recipe, const CurveResult& r
 }
 
 Json CurveResult::json(const CurveRecipe& recipe, const std::string& command, std::uint64_t seed) const {
-  std::vector<std::string_view> weights;
-  for (const WeightFactor factor : recipe.weights)
-    weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
   const Json domain{{"views", "all"},
                     {"grid", recipe.grid_name},
                     {"theta_i", recipe.grid.theta_i.values},
                     {"theta_o", recipe.grid.theta_o.values},
                     {"phi", recipe.grid.phi.values},
                     {"metric", quantity_names[static_cast<std::size_t>(recipe.quantity)]},
-                    {"weights", weights}};
-  const auto reference_json = [](const std::string& name, const ParameterValues& values) {
-    Json json{{"name", name}};
-    for (const ParameterInfo& info : values.list()) {
-      if (!info.choices.empty()) json[std::string(info.name)] = std::string(values.choice(info.name));
-    }
-    return json;
-  };
+                    {"weights", weight_names(recipe.weights)}};
   const auto tangent = [](bool contested_free) { return contested_free ? "free" : "fixed"; };
   Json row_list = Json::array(), curve_list = Json::array(), comparison_list = Json::array();
   for (const CurveRow& row : rows) {

@@ -405,27 +405,29 @@ Json metrics_json(const std::vector<FitMetric>& metrics) {
 
 }  // namespace
 
+Json estimate_json(const FitParameter& p) {
+  return {{"value", p.estimate.value},
+          {"stderr", p.estimate.standard_error},
+          {"ci95", {p.estimate.ci_low, p.estimate.ci_high}},
+          {"misfit_stderr", p.estimate.misfit_standard_error},
+          {"lower", p.lower},
+          {"upper", p.upper},
+          {"at_bound", p.estimate.at_bound},
+          {"identifiable", p.estimate.identifiable}};
+}
+
 Json Fit::json(const std::string& command, const std::string& table_sha256) const {
   Json list = Json::array();
   for (const FitParameter& p : parameters) {
-    list.push_back({{"name", p.name},
-                    {"value", p.estimate.value},
-                    {"stderr", p.estimate.standard_error},
-                    {"ci95", {p.estimate.ci_low, p.estimate.ci_high}},
-                    {"misfit_stderr", p.estimate.misfit_standard_error},
-                    {"lower", p.lower},
-                    {"upper", p.upper},
-                    {"at_bound", p.estimate.at_bound},
-                    {"identifiable", p.estimate.identifiable},
-                    {"free", p.free}});
+    Json line{{"name", p.name}};
+    line.update(estimate_json(p));
+    line["free"] = p.free;
+    list.push_back(std::move(line));
   }
   Json mapping_list = Json::array();
   for (const AxisMapping& m : mappings) {
     mapping_list.push_back({{"parameter", m.parameter}, {"axis", m.axis}, {"scale", m.scale}, {"power", m.power}});
   }
-  std::vector<std::string_view> weights;
-  for (const WeightFactor factor : options.weights)
-    weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
   Json document{
       {"model", model},
       {"params", list},
@@ -440,7 +442,7 @@ Json Fit::json(const std::string& command, const std::string& table_sha256) cons
         {"starts", starts_tried},
         {"message", solution.termination},
         {"metric", quantity_names[static_cast<std::size_t>(options.quantity)]},
-        {"weights", weights},
+        {"weights", weight_names(options.weights)},
         {"loss", loss_names[static_cast<std::size_t>(options.loss)]}}},
       {"provenance",
        {{"version", LOBEFIT_VERSION}, {"command", command}, {"seed", options.seed}, {"table_sha256", table_sha256}}}};

@@ -50,6 +50,9 @@ struct FitParameter {
   bool free = false;
 };
 
+/// Its value, errors and bounds, as results list them.
+Json estimate_json(const FitParameter& parameter);
+
 struct FitMetric {
   std::string name;
   double value;

@@ -323,16 +323,9 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
   Json lines = Json::array();
   for (const RecipeResultRow& line : rows) {
     const RecipeRow& row = *line.row;
-    Json reference{{"name", row.reference}};
-    for (const ParameterInfo& info : row.reference_values.list()) {
-      if (!info.choices.empty())
-        reference[std::string(info.name)] = std::string(row.reference_values.choice(info.name));
-    }
+    const Json reference = reference_json(row.reference, row.reference_values);
     Json axes = Json::object();
     for (const Axis& axis : recipe.parameter_axes) axes[axis.name] = axis.values;
-    std::vector<std::string_view> weights;
-    for (const WeightFactor factor : row.weights)
-      weights.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
     Json parameters = Json::object(), fixed = Json::object();
     for (const FitParameter& p : line.fit.parameters) {
       if (!p.free) {
@@ -359,7 +352,7 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
                        {"theta_o", row.grid.theta_o.values},
                        {"phi", row.grid.phi.values},
                        {"metric", quantity_names[static_cast<std::size_t>(row.quantity)]},
-                       {"weights", weights}}},
+                       {"weights", weight_names(row.weights)}}},
                      {"method", line.method},
                      {"free", line.free},
                      {"fixed", fixed},

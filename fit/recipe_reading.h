@@ -1,5 +1,5 @@
-// What the readers of recipes share: parameters by name, and complaints about usage turned into complaints about a
-// file.
+// What recipes share in reading and writing: parameters by name, complaints about usage turned into complaints about a
+// file, references.
 #pragma once
 
 #include <filesystem>
@@ -49,6 +49,15 @@ auto naming_file(const std::filesystem::path& path, Read&& read) {
     if (message.find(path.string()) != std::string::npos) throw;
     throw error.inside(error.code(), path.string());
   }
+}
+
+/// A reference and its named choices, as results state it.
+inline Json reference_json(const std::string& name, const ParameterValues& values) {
+  Json json{{"name", name}};
+  for (const ParameterInfo& info : values.list()) {
+    if (!info.choices.empty()) json[std::string(info.name)] = std::string(values.choice(info.name));
+  }
+  return json;
 }
 
 }  // namespace lobefit

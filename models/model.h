@@ -98,6 +98,14 @@ LOBEFIT_TEXT auto choose(const C& choice, const First& first, const Rest&... res
   }
 }
 
+/// The number that choose() makes of a choice's value, of `count` choices.
+template <class Slot>
+constexpr int choice_number(Slot value, int count) {
+  int number = 0;
+  while (number + 1 < count && value >= static_cast<Slot>(number + 0.5)) ++number;
+  return number;
+}
+
 // Parameters that many models share, declared once.
 
 inline constexpr ParameterInfo albedo_parameter{

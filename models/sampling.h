@@ -15,6 +15,18 @@ inline Direction sample_cosine(const std::array<double, 2>& u) {
 }
 inline double cosine_density(const Direction& w) { return max(w.z, 0.0) / pi; }
 
+/// Base of models whose lobe covers the whole hemisphere: sampled by the cosine.
+struct CosineSampling {
+  template <class P>
+  static Direction sample(const P&, const Direction&, const std::array<double, 2>& u) {
+    return sample_cosine(u);
+  }
+  template <class P>
+  static double pdf(const P&, const Direction& wi, const Direction&) {
+    return cosine_density(wi);
+  }
+};
+
 /// Picks a lobe by its share (shares add up to 1), and stretches u[0] over [0, 1) again for that lobe.
 template <std::size_t n>
 std::size_t pick_lobe(const std::array<double, n>& shares, std::array<double, 2>& u) {

@@ -38,6 +38,11 @@ enum class WeightFactor {
 };
 inline constexpr std::array<std::string_view, 6> weight_factor_names{"sin_theta_i", "sin_theta_o", "cos_theta_i",
                                                                      "cos_theta_o", "quadrature",  "inverse_variance"};
+inline std::vector<std::string_view> weight_names(const std::vector<WeightFactor>& weights) {
+  std::vector<std::string_view> names;
+  for (const WeightFactor factor : weights) names.push_back(weight_factor_names[static_cast<std::size_t>(factor)]);
+  return names;
+}
 /// From "uniform" or names separated by commas; a name may repeat. Throws Error(usage).
 std::vector<WeightFactor> parse_weights(std::string_view text);
 

@@ -15,21 +15,10 @@
 #include "reference/specular/albedo_table.h"
 #include "tests/directions.h"
 #include "tests/gauss_legendre.h"
+#include "tests/model_values.h"
 
 namespace lobefit {
 namespace {
-
-using Parameters = std::initializer_list<std::pair<std::string_view, double>>;
-
-std::vector<double> flat_of(std::string_view name, Parameters parameters) {
-  ParameterValues values = find_model(name).defaults();
-  for (const auto& [parameter, value] : parameters) values.set(parameter, value);
-  return {values.flat().begin(), values.flat().end()};
-}
-
-double value(std::string_view name, Parameters parameters, const Direction& wi, const Direction& wo) {
-  return find_model(name).evaluate(flat_of(name, parameters), wi, wo).x;
-}
 
 /// The integrals that the shipped tables were made of.
 double albedo(double cosine, double alpha) {

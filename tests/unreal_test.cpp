@@ -15,35 +15,11 @@
 #include "evaluate/float_model.h"
 #include "models/unreal/clear_coat.h"
 #include "models/unreal/preintegrated_skin.h"
+#include "tests/model_values.h"
 #include "tests/sphere_sampling.h"
 
 namespace lobefit {
 namespace {
-
-using Parameters = std::initializer_list<std::pair<std::string_view, double>>;
-
-class Material {
- public:
-  explicit Material(std::string_view name, Parameters parameters = {})
-      : model_(find_model(name)), values_(model_.defaults()) {
-    for (const auto& [parameter, value] : parameters) values_.set(parameter, value);
-  }
-  Material& set(std::string_view parameter, double value) {
-    values_.set(parameter, value);
-    return *this;
-  }
-  Material& color(std::string_view parameter, std::array<double, 3> rgb) {
-    values_.set(parameter, std::span<const double>(rgb));
-    return *this;
-  }
-  Rgb operator()(const Direction& wi, const Direction& wo) const { return model_.evaluate(values_.flat(), wi, wo); }
-  const Model& model() const { return model_; }
-  std::span<const double> flat() const { return values_.flat(); }
-
- private:
-  const Model& model_;
-  ParameterValues values_;
-};
 
 Direction at(double theta, double phi) { return direction(radians(theta), radians(phi)); }
 

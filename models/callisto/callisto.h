@@ -146,15 +146,13 @@ struct CallistoModel {
   /// Half by the cosine, half by the facets that wo sees, of the two lobes in their shares.
   static Direction sample(const Parameters<double>& p, const Direction& wo, std::array<double, 2> u) {
     const std::size_t lobe = pick_lobe(shares(p), u);
-    return lobe == 0 ? sample_cosine(u) : reflect(wo, sample_visible_facet(Distribution::ggx, alpha(p, lobe), wo, u));
+    return lobe == 0 ? sample_cosine(u) : sample_visible_reflection(Distribution::ggx, alpha(p, lobe), wo, u);
   }
   static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
     const std::array<double, 3> share = shares(p);
     double density = share[0] * cosine_density(wi);
     for (const std::size_t lobe : {std::size_t{1}, std::size_t{2}}) {
-      density += share[lobe] * reflected_density(wi, wo, [&](const Direction& m) {
-                   return visible_facet_density(Distribution::ggx, alpha(p, lobe), wo, m);
-                 });
+      density += share[lobe] * visible_reflection_density(Distribution::ggx, alpha(p, lobe), wi, wo);
     }
     return density;
   }

@@ -75,14 +75,11 @@ struct CallistoUe427 {
 
   /// Half by the cosine, half by the facets that wo sees.
   static Direction sample(const Parameters<double>& p, const Direction& wo, std::array<double, 2> u) {
-    return pick_lobe(std::array{0.5, 0.5}, u) == 0
-               ? sample_cosine(u)
-               : reflect(wo, sample_visible_facet(Distribution::ggx, alpha(p), wo, u));
+    return pick_lobe(std::array{0.5, 0.5}, u) == 0 ? sample_cosine(u)
+                                                   : sample_visible_reflection(Distribution::ggx, alpha(p), wo, u);
   }
   static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
-    return 0.5 * cosine_density(wi) + 0.5 * reflected_density(wi, wo, [&](const Direction& m) {
-                                        return visible_facet_density(Distribution::ggx, alpha(p), wo, m);
-                                      });
+    return 0.5 * cosine_density(wi) + 0.5 * visible_reflection_density(Distribution::ggx, alpha(p), wi, wo);
   }
 
  private:

@@ -6,7 +6,7 @@
 
 namespace lobefit {
 
-struct Lambert {
+struct Lambert : CosineSampling {
   static constexpr ModelInfo info{.name = "lambert",
                                   .title = "Lambert diffuse",
                                   .source = "Lambert 1760, Photometria",
@@ -28,11 +28,6 @@ struct Lambert {
   LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>&) {
     return p.albedo / pi;
   }
-
-  static Direction sample(const Parameters<double>&, const Direction&, const std::array<double, 2>& u) {
-    return sample_cosine(u);
-  }
-  static double pdf(const Parameters<double>&, const Direction& wi, const Direction&) { return cosine_density(wi); }
 };
 
 }  // namespace lobefit

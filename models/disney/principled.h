@@ -126,14 +126,13 @@ struct Disney {
   static Direction sample(const Parameters<double>& p, const Direction& wo, std::array<double, 2> u) {
     switch (pick_lobe(shares(p, wo), u)) {
       case 0: return sample_cosine(u);
-      case 1: return reflect(wo, sample_visible_facet(Distribution::ggx, sampled_alphas(p), wo, u));
+      case 1: return sample_visible_reflection(Distribution::ggx, sampled_alphas(p), wo, u);
       default: return reflect(wo, sample_gtr1_facet(coat_alpha(p), u));
     }
   }
   static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
     const std::array<double, 3> share = shares(p, wo);
-    const double specular = reflected_density(
-        wi, wo, [&](const Direction& m) { return visible_facet_density(Distribution::ggx, sampled_alphas(p), wo, m); });
+    const double specular = visible_reflection_density(Distribution::ggx, sampled_alphas(p), wi, wo);
     const double coat = reflected_density(wi, wo, [&](const Direction& m) {
       return Gtr1Distribution::evaluate(m.x * m.x + m.y * m.y, coat_alpha(p)) * max(m.z, 0.0);
     });

@@ -31,12 +31,10 @@ struct CompensatedGgx {
 
   /// The lobe of one bounce, by the facets that the view sees.
   static Direction sample(double alpha, const Direction& wo, const std::array<double, 2>& u) {
-    return reflect(wo, sample_visible_facet(Distribution::ggx, {alpha, alpha}, wo, u));
+    return sample_visible_reflection(Distribution::ggx, alpha, wo, u);
   }
   static double pdf(double alpha, const Direction& wi, const Direction& wo) {
-    return reflected_density(wi, wo, [&](const Direction& m) {
-      return visible_facet_density(Distribution::ggx, {alpha, alpha}, wo, m);
-    });
+    return visible_reflection_density(Distribution::ggx, alpha, wi, wo);
   }
 };
 
@@ -126,7 +124,7 @@ struct SpecularGgxKullaConty {
   };
   template <class Slot>
   static int variant(std::span<const Slot> flat) {
-    return flat.back() < static_cast<Slot>(0.5) ? 0 : 1;
+    return choice_number(flat.back(), variant_count);
   }
 
   /// The share that the lobe loses by 1/(μ + 3 α), nearly as the light is lost; the cosine would leave a smooth

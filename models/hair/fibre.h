@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "models/geometry.h"
+#include "models/microfacet/fresnel.h"
 #include "models/parameter.h"
 
 namespace lobefit {
@@ -132,17 +133,6 @@ struct HairSchlick {
   template <class X, class F>
   LOBEFIT_TEXT static auto evaluate(const X& cosine, const F& f0) {
     return f0 + (1.0 - f0) * call<Pow5>(1.0 - cosine);
-  }
-};
-
-/// 1 - HairSchlick, which would cancel where next to nothing enters: 1 - (1 - c)⁵ is c times a polynomial.
-struct HairSchlickTransmittance {
-  static constexpr const char* name = "hair_one_minus_f";
-  static constexpr std::array arguments{"cosine", "f0"};
-
-  template <class X, class F>
-  LOBEFIT_TEXT static auto evaluate(const X& cosine, const F& f0) {
-    return (1.0 - f0) * (cosine * (5.0 - cosine * (10.0 - cosine * (10.0 - cosine * (5.0 - cosine)))));
   }
 };
 

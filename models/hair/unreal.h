@@ -178,7 +178,7 @@ struct HairUnreal {
     // TT
     const T a = let("a", cos_theta_d / (p.eta_prime_inverse + p.eta_prime_cosine * cos_theta_d * cos_theta_d));
     const T h = let("h", cos_half_phi * (1.0 + a * (p.tt_offset_constant - p.tt_offset_cosine * cos_phi)));
-    const T enters_tt = let("enters_tt", call<HairSchlickTransmittance>(cos_theta_d * sqrt(1.0 - min(h * h, 1.0)), f0));
+    const T enters_tt = let("enters_tt", call<SchlickTransmittance>(cos_theta_d * sqrt(1.0 - min(h * h, 1.0)), f0));
     const T inner = let("inner", h * h * (a * a));  // sin²γ_t
     const T d_b = let("d_b", call<ChiangAbsorptionScale>(p.absorption_roughness));
     const T length = let(
@@ -193,7 +193,7 @@ struct HairUnreal {
 
     // TRT
     const T f_trt = let("f_trt", call<HairSchlick>(cos_theta_d * p.trt_cosine, f0));
-    const T enters_trt = let("enters_trt", call<HairSchlickTransmittance>(cos_theta_d * p.trt_cosine, f0));
+    const T enters_trt = let("enters_trt", call<SchlickTransmittance>(cos_theta_d * p.trt_cosine, f0));
     Vec3<T> t_trt = let("t_trt", call<HairColorPower>(p.base_color, T(p.trt_absorption / cos_theta_d)));
     const T n_trt = let("n_trt", exp(p.trt_azimuth_cosine * cos_phi - p.trt_azimuth_constant));
     const T trt = let("trt", call<HairGaussian>(p.width_trt * width, sines - p.tilt_trt * p.shift) *

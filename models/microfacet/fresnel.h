@@ -42,6 +42,18 @@ struct SchlickFresnel {
   }
 };
 
+/// 1 - Schlick's reflectance for f90 = 1, which would cancel where next to nothing enters: 1 - (1 - c)⁵ is c times a
+/// polynomial.
+struct SchlickTransmittance {
+  static constexpr const char* name = "one_minus_f_schlick";
+  static constexpr std::array arguments{"cosine", "f0"};
+
+  template <class T, class F>
+  LOBEFIT_TEXT static auto evaluate(const T& cosine, const F& f0) {
+    return (1.0 - f0) * (cosine * (5.0 - cosine * (10.0 - cosine * (10.0 - cosine * (5.0 - cosine)))));
+  }
+};
+
 /// Fresnel's equations between two dielectrics, unpolarised. `eta`: the index beyond the interface over the index on
 /// the light's side. Past the critical angle the guarded root vanishes and the result is 1.
 struct DielectricFresnel {

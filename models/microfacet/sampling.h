@@ -1,10 +1,7 @@
 // Sampling of facet normals and of reflected directions, in double.
 //
-//   const Direction m = sample_visible_facet(Distribution::ggx, {0.2, 0.1}, wo, u);   // u in [0, 1)²
-//   const Direction wi = reflect(wo, m);
-//   const double density = reflected_density(wi, wo, [&](const Direction& facet) {
-//     return visible_facet_density(Distribution::ggx, {0.2, 0.1}, wo, facet);
-//   });
+//   const Direction wi = sample_visible_reflection(Distribution::ggx, {0.2, 0.1}, wo, u);   // u in [0, 1)²
+//   const double density = visible_reflection_density(Distribution::ggx, {0.2, 0.1}, wi, wo);
 //
 // Two densities, both per solid angle of m, w above the surface:
 //   facets           D(m) cos θ_m                                  half-vector sampling
@@ -115,6 +112,17 @@ double reflected_density(const Direction& wi, const Direction& wo, Density&& fac
   const Direction m = normalize(wi + wo);
   const double cosine = dot(wo, m);
   return cosine > 0.0 ? facet_density(m) / (4.0 * cosine) : 0.0;
+}
+
+/// A mirror direction at a facet that wo sees.
+inline Direction sample_visible_reflection(Distribution distribution, Alpha alpha, const Direction& wo,
+                                           const std::array<double, 2>& u) {
+  return reflect(wo, sample_visible_facet(distribution, alpha, wo, u));
+}
+inline double visible_reflection_density(Distribution distribution, Alpha alpha, const Direction& wi,
+                                         const Direction& wo) {
+  return reflected_density(wi, wo,
+                           [&](const Direction& m) { return visible_facet_density(distribution, alpha, wo, m); });
 }
 
 }  // namespace lobefit

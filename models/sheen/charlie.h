@@ -96,7 +96,7 @@ struct SheenCharlie : CosineSampling {
   };
   template <class Slot>
   static int variant(std::span<const Slot> flat) {
-    return flat.back() < Slot(0.5) ? 0 : flat.back() < Slot(1.5) ? 1 : 2;
+    return choice_number(flat.back(), variant_count);
   }
 
  private:

@@ -103,11 +103,10 @@ struct SpecularGgx {
 
   /// By the facets that wo sees.
   static Direction sample(const Parameters<double>& p, const Direction& wo, const std::array<double, 2>& u) {
-    return reflect(wo, sample_visible_facet(Distribution::ggx, alphas(p), wo, u));
+    return sample_visible_reflection(Distribution::ggx, alphas(p), wo, u);
   }
   static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
-    return reflected_density(
-        wi, wo, [&](const Direction& m) { return visible_facet_density(Distribution::ggx, alphas(p), wo, m); });
+    return visible_reflection_density(Distribution::ggx, alphas(p), wi, wo);
   }
 
  private:

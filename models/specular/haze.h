@@ -81,14 +81,12 @@ struct SpecularHaze {
     const Haze<double> haze(p.f0, p.alpha, p.haziness, p.haze_extent);
     std::array<double, 2> rest = u;
     const double alpha = pick_lobe<2>({haze.weight, 1.0 - haze.weight}, rest) == 0 ? haze.wide_alpha : p.alpha;
-    return reflect(wo, sample_visible_facet(Distribution::ggx, {alpha, alpha}, wo, rest));
+    return sample_visible_reflection(Distribution::ggx, alpha, wo, rest);
   }
   static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
     const Haze<double> haze(p.f0, p.alpha, p.haziness, p.haze_extent);
-    return reflected_density(wi, wo, [&](const Direction& m) {
-      return lerp(visible_facet_density(Distribution::ggx, {p.alpha, p.alpha}, wo, m),
-                  visible_facet_density(Distribution::ggx, {haze.wide_alpha, haze.wide_alpha}, wo, m), haze.weight);
-    });
+    return lerp(visible_reflection_density(Distribution::ggx, p.alpha, wi, wo),
+                visible_reflection_density(Distribution::ggx, haze.wide_alpha, wi, wo), haze.weight);
   }
 };
 

@@ -89,13 +89,9 @@ struct SpecularKaris {
 
   template <class Slot>
   static int variant(std::span<const Slot> flat) {
-    // The choices are the last three numbers, rounded as choose() does.
-    const auto choice = [&](std::size_t from_end) {
-      int number = 0;
-      while (number < 7 && flat[flat.size() - from_end] >= static_cast<Slot>(number + 0.5)) ++number;
-      return number;
-    };
-    return (choice(3) * 8 + choice(2)) * 3 + choice(1);
+    // The choices are the last three numbers.
+    const auto last = flat.last(3);
+    return (choice_number(last[0], 4) * 8 + choice_number(last[1], 8)) * 3 + choice_number(last[2], 3);
   }
 
  private:

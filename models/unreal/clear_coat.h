@@ -83,11 +83,10 @@ struct UnrealClearCoat {
   static Direction sample(const Parameters<double>& p, const Direction& wo, std::array<double, 2> u) {
     const double share = coat_share(p, wo);
     if (pick_lobe(std::array{share, 1.0 - share}, u) == 1) return base_lobes(p, wo).sample(wo, u);
-    return reflect(wo, sample_visible_facet(Distribution::ggx, film_alpha(p), wo, u));
+    return sample_visible_reflection(Distribution::ggx, film_alpha(p), wo, u);
   }
   static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
-    const double coat = reflected_density(
-        wi, wo, [&](const Direction& m) { return visible_facet_density(Distribution::ggx, film_alpha(p), wo, m); });
+    const double coat = visible_reflection_density(Distribution::ggx, film_alpha(p), wi, wo);
     return lerp(base_lobes(p, wo).pdf(wi, wo), coat, coat_share(p, wo));
   }
 

@@ -139,13 +139,12 @@ struct UnrealLobes {
   Direction sample(const Direction& wo, std::array<double, 2> u) const {
     switch (pick_lobe(shares, u)) {
       case 0: return sample_cosine(u);
-      case 1: return reflect(wo, sample_visible_facet(Distribution::ggx, alpha, wo, u));
+      case 1: return sample_visible_reflection(Distribution::ggx, alpha, wo, u);
       default: return sample_sphere(u);
     }
   }
   double pdf(const Direction& wi, const Direction& wo) const {
-    const double specular = reflected_density(
-        wi, wo, [&](const Direction& m) { return visible_facet_density(Distribution::ggx, alpha, wo, m); });
+    const double specular = visible_reflection_density(Distribution::ggx, alpha, wi, wo);
     return shares[0] * cosine_density(wi) + shares[1] * specular + shares[2] / (4.0 * pi);
   }
 

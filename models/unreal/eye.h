@@ -65,10 +65,7 @@ struct UnrealEye {
     Vec3<T> white{T(1.0), T(1.0), T(1.0)};
     Vec3<T> specular_color = unreal_specular_color(p);
     Vec3<T> fresnel = let("fresnel", lerp(specular_color, white, call<Pow5>(1.0 - g.cos_theta_d)));
-    // 1 - (1 - V·H)⁵ expanded, which keeps its digits where nearly all is reflected.
-    const G x = g.cos_theta_d;
-    const G entering = let("entering", x * (5.0 - x * (10.0 - x * (10.0 - x * (5.0 - x)))));
-    Vec3<T> refracted = let("refracted", (1.0 - specular_color) * entering);
+    Vec3<T> refracted = let("refracted", call<SchlickTransmittance>(g.cos_theta_d, specular_color));
     const T lobe = let("lobe", call<UnrealGgx>(g.sin2_theta_h, cos_theta_i, g.cos_theta_o, unreal_alpha(p.roughness)));
     const T cornea = let("cornea", select(g.cos_theta_i > 0.0, lobe, T(0.0)));
 
@@ -77,8 +74,7 @@ struct UnrealEye {
     Vec3<T> bent = let("bent", axis * (1.0 - depth));
     Vec3<T> focus = let("focus", normalize(Vec3<T>{bent.x, bent.y, bent.z - depth}));
     const T lit = let("lit", lerp(cos_theta_i, call<UnrealIris>(g.wi, axis, focus), p.iris_mask));
-    return fresnel * cornea +
-           unreal_diffuse_color(p) / pi * refracted * (lit / max(abs(g.cos_theta_i), smallest_base));
+    return fresnel * cornea + unreal_diffuse_color(p) / pi * refracted * (lit / max(abs(g.cos_theta_i), smallest_base));
   }
 
   static Direction sample(const Parameters<double>& p, const Direction& wo, const std::array<double, 2>& u) {
