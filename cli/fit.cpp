@@ -3,8 +3,9 @@
 
 #include <iostream>
 
-#include "cli/arguments.h"
+#include "cli/fit_batch.h"
 #include "cli/fit_text.h"
+#include "reference/formats/neural_brdf.h"
 #include "reference/output_file.h"
 
 namespace lobefit {
@@ -12,59 +13,50 @@ namespace lobefit {
 namespace {
 
 struct FitArguments {
-  std::string model, table, output, tier = "full", metric = "log", weights = "uniform", loss = "none";
-  std::vector<std::string> free, fix, mappings;
-  FitOptions options;
+  std::string model, output;
+  std::vector<std::string> tables, materials;
+  FitSettings settings;
+  bool resume = false;
 };
 
-/// "huber:0.02" → Huber at 0.02 of the metric's quantity.
-void parse_loss(const std::string& text, FitOptions& options) {
-  const std::size_t colon = text.find(':');
-  const std::string name = text.substr(0, colon);
-  const auto found = std::find(loss_names.begin(), loss_names.end(), name);
-  if (found == loss_names.end()) {
-    throw Error(ExitCode::usage, "unknown loss '" + name + "'", "--loss",
-                "choose none, huber or cauchy, such as huber:0.05");
+/// Every file, or every chosen material of the files that hold several.
+std::vector<FitSource> find_sources(const FitArguments& a) {
+  std::vector<FitSource> sources;
+  for (const std::string& path : a.tables) {
+    if (a.materials.empty()) {
+      sources.push_back({path, ""});
+      continue;
+    }
+    std::vector<std::string> names = a.materials;
+    if (names.front() == "all") {
+      const std::string text = read_file(path);
+      if (!NeuralBrdf::recognise(text))
+        throw Error(ExitCode::usage, "the file holds one material only", path, "leave out --material");
+      names = NeuralBrdf::materials(text);
+    }
+    for (const std::string& name : names) sources.push_back({path, name});
   }
-  options.loss = static_cast<Loss>(found - loss_names.begin());
-  if (colon == std::string::npos) return;
-  options.loss_scale = parse_number(text.substr(colon + 1), "--loss");
-  if (options.loss_scale <= 0.0)
-    throw Error(ExitCode::usage, "the scale must be positive", "--loss", "such as huber:0.05");
+  return sources;
 }
 
-/// Which parameters are free, and the values of the others.
-std::vector<std::string> choose_free(const FitArguments& a, const Table& table, const FitOptions& options,
-                                     ParameterValues& values) {
-  // NAME or NAME=VALUE: the names, their values set.
-  const auto names_of = [&](const std::vector<std::string>& texts) {
-    std::vector<std::string> names;
-    for (const std::string& text : texts) {
-      const std::size_t equals = text.find('=');
-      names.push_back(text.substr(0, equals));
-      values.info(names.back());
-      if (equals != std::string::npos) values.set_text(names.back(), std::string_view(text).substr(equals + 1));
-    }
-    return names;
-  };
-  const std::vector<std::string> fixed = names_of(a.fix);
-  std::vector<std::string> free = names_of(a.free);
-  if (a.free.empty()) {
-    const Tier tier = a.tier == "base" ? Tier::base : a.tier == "advanced" ? Tier::advanced : Tier::full;
-    const bool from_reference = find_reference_or_null(table.model) != nullptr;
-    for (const std::string& name : free_parameters(values, table, options.mappings, tier)) {
-      // What the reference's own settings say is known, not fitted.
-      if (!(from_reference && table.parameters.contains(name))) free.push_back(name);
-    }
+void run_one(const FitArguments& a, const FitSource& source, const Context& context) {
+  std::optional<OutputFile> file;
+  if (!a.output.empty()) file.emplace(a.output, context.force);
+  const auto monitor = context.monitor();
+  const FitJob job = run_fit(a.settings, source, context, *monitor);
+  if (file) {
+    file->write(job.document.dump(2) + "\n");
+    file->commit();
   }
-  for (const std::string& name : fixed) {
-    if (!a.free.empty() && std::find(free.begin(), free.end(), name) != free.end()) {
-      throw Error(ExitCode::usage, "parameter '" + name + "' is both free and fixed", "fit",
-                  "drop it from one of them");
-    }
-    std::erase(free, name);
+  if (context.json) {
+    std::cout << job.document.dump(2) << "\n";
+  } else {
+    fmt::print("{}{}", fit_text(job.fit), tiers_text(job.tiers));
   }
-  return free;
+  if (!job.fit.solution.converged) {
+    throw Error(ExitCode::not_converged, "the fit did not converge: " + job.fit.solution.termination, a.model,
+                "try --starts 16, or free fewer parameters");
+  }
 }
 
 }  // namespace
@@ -74,61 +66,84 @@ void add_fit(CLI::App& app, Context& context) {
       "fit",
       "Fit a model's parameters to a table, with uncertainty\n"
       "  lobefit fit proxima truth.exr --free a,b -o fit.json\n"
+      "  lobefit fit callisto blue.bsdf --compare-tiers --holdout 0.2 -o blue.json\n"
+      "  lobefit fit callisto measured/*.bsdf -o fits/             every file; fits/summary.md, .csv, .json\n"
+      "  lobefit fit callisto merl_nbrdf.txt --material all -o fits/\n"
       "Parameters that the table's axes set follow the axes; those that its reference states keep those values.\n"
-      "ci95 covers the table's own Monte Carlo error, misfit_stderr what the model's misfit leaves open.");
+      "ci95 covers the table's own Monte Carlo error, misfit_stderr what the model's misfit leaves open.\n"
+      "Dense measurements (MERL, isotropic RGL) are taken at 45 x 45 x 90 angles (--grid measured) with weights\n"
+      "sin theta_i sin theta_o, fitted lobe by lobe from six starts, and their ci95 tells how far a value would move "
+      "had\n"
+      "other ranges of directions been measured.");
   const auto a = std::make_shared<FitArguments>();
+  FitSettings& settings = a->settings;
   verb->add_option("MODEL", a->model, "Model: see `lobefit models`")->required();
-  verb->add_option("TABLE", a->table, "Table or measured file (EXR, MERL, RGL, UTIA, ALTA, Klems)")->required();
-  verb->add_option("-o,--output", a->output, "Fit to write (.json)");
-  add_repeatable(*verb, "--free", a->free, "Parameters to fit, NAME or NAME=START (repeatable, or separated by commas)")
+  verb->add_option("TABLE", a->tables, "Tables or measured files (EXR, MERL, RGL, UTIA, ALTA, Klems, NBRDF weights)")
+      ->required();
+  verb->add_option("-o,--output", a->output, "Fit to write (.json); for several materials a folder");
+  add_repeatable(*verb, "--material", a->materials, "Material of a file that holds several (repeatable), or all")
       ->delimiter(',');
-  add_repeatable(*verb, "--fix", a->fix, "Parameters to hold, NAME or NAME=VALUE (repeatable)");
-  add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER: a table axis sets a parameter (repeatable)");
-  verb->add_option("--tier", a->tier, "Without --free: fit the parameters up to this tier")
+  add_repeatable(*verb, "--free", settings.free,
+                 "Parameters to fit, NAME or NAME=START (repeatable, or separated by commas)")
+      ->delimiter(',');
+  add_repeatable(*verb, "--fix", settings.fix, "Parameters to hold, NAME or NAME=VALUE (repeatable)");
+  add_repeatable(*verb, "--bound", settings.bounds,
+                 "NAME=LOWER,UPPER: narrower bounds of a free parameter (repeatable); staged fits keep "
+                 "diffuse_fresnel_falloff and retroreflection_falloff below 0.95");
+  add_repeatable(*verb, "--map", settings.mappings,
+                 "NAME=SCALE*AXIS^POWER: a table axis sets a parameter (repeatable)");
+  verb->add_option("--tier", settings.tier, "Without --free: fit the parameters up to this tier")
       ->check(CLI::IsMember({"base", "advanced", "full"}))
       ->capture_default_str();
-  verb->add_option("--metric", a->metric,
+  verb->add_flag("--compare-tiers", settings.compare_tiers, "Fit each tier, and say what it buys");
+  verb->add_option("--lobes", settings.lobes, "Without --free: specular lobes, of models that may have two")
+      ->check(CLI::Range(1, 2))
+      ->capture_default_str();
+  verb->add_option("--metric", settings.metric,
                    "cosine (pi f cos), brdf (pi f), log (log(1 + f cos)), cube_root ((f cos)^1/3)")
       ->capture_default_str();
+  verb->add_option("--weights", settings.weights,
+                   "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, "
+                   "inverse_variance (default: uniform; of dense measurements sin_theta_i,sin_theta_o)");
+  verb->add_option("--loss", settings.loss, "none, huber[:SCALE] or cauchy[:SCALE], SCALE in units of the metric")
+      ->capture_default_str();
+  verb->add_option("--grid", settings.grid, "Angles to fit at: native, small, default, fine, measured, or a JSON file")
+      ->capture_default_str();
+  verb->add_option("--directions", settings.directions,
+                   "Fit a stratified sample of so many entries, 0: all (default: all; of dense measurements 50000)");
+  verb->add_option("--starts", settings.starts,
+                   "Start points: the first is the model's default, or with --staged a guess from the table (default: "
+                   "1; of dense measurements 6)")
+      ->check(CLI::Range(1, 10000));
+  CLI::Option* const staged =
+      verb->add_flag("--staged", settings.staged,
+                     "Grow the fit lobe by lobe from a guess made from the table (default for dense measurements)");
+  verb->add_flag("--not-staged", settings.not_staged, "Start from the model's defaults all the same")->excludes(staged);
+  verb->add_option("--prior", settings.prior,
+                   "With --staged: what the data leave open is pulled to neutral values; a parameter's whole width "
+                   "costs the square of this share of the misfit")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  verb->add_option("--intervals", settings.intervals,
+                   "ci95 from the table's own errors (data), or from blocks of directions (default: data; of dense "
+                   "measurements blocks)")
+      ->check(CLI::IsMember({"data", "blocks"}));
   verb->add_option(
-          "--weights", a->weights,
-          "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
-      ->capture_default_str();
-  verb->add_option("--loss", a->loss, "none, huber[:SCALE] or cauchy[:SCALE], SCALE in units of the metric")
-      ->capture_default_str();
-  verb->add_option("--starts", a->options.starts, "Start points: the first is the model's default")
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  verb->add_option("--holdout", a->options.holdout, "Fraction of entries kept out of the fit and scored")
+          "--holdout", settings.holdout,
+          "Fraction of entries kept out of the fit and scored; of dense measurements whole blocks of directions")
       ->check(CLI::Range(0.0, 0.9));
+  verb->add_flag("--resume", a->resume, "Of several materials: keep the fits that the folder holds already");
   verb->callback([&context, a] {
-    const Model& model = find_model(a->model);
-    FitOptions options = a->options;
-    options.quantity = parse_quantity(a->metric);
-    options.weights = parse_weights(a->weights);
-    options.seed = context.seed;
-    parse_loss(a->loss, options);
-    for (const std::string& text : a->mappings) options.mappings.push_back(AxisMapping::parse(text));
-    const Table table = read_table(a->table);
-    ParameterValues values = with_table_parameters(model.defaults(), table);
-    options.free = choose_free(*a, table, options, values);
-    std::optional<OutputFile> file;
-    if (!a->output.empty()) file.emplace(a->output, context.force);
-    const auto monitor = context.monitor();
-    const Fit result = fit(model, values, table, options, *monitor);
-    const Json document = result.json(context.command, sha256_of_file(a->table));
-    if (file) {
-      file->write(document.dump(2) + "\n");
-      file->commit();
-    }
-    if (context.json) {
-      std::cout << document.dump(2) << "\n";
+    a->settings.model = &find_model(a->model);
+    parse_quantity(a->settings.metric);
+    const std::vector<FitSource> sources = find_sources(*a);
+    const bool folder = std::filesystem::is_directory(a->output) || a->output.ends_with('/');
+    if (sources.size() == 1 && !folder) {
+      run_one(*a, sources.front(), context);
+    } else if (a->output.empty()) {
+      throw Error(ExitCode::usage, "several materials, and nowhere to write their fits", "-o", "name a folder");
     } else {
-      fmt::print("{}", fit_text(result));
-    }
-    if (!result.solution.converged) {
-      throw Error(ExitCode::not_converged, "the fit did not converge: " + result.solution.termination, a->model,
-                  "try --starts 16, or free fewer parameters");
+      run_fit_batch(a->settings, sources, a->output, a->resume, context);
     }
   });
 }

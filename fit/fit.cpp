@@ -1,11 +1,17 @@
 #include "fit/fit.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <optional>
 
-#include "fit/dual_model.h"
+#include "fit/sample_entries.h"
+#include "fit/starts.h"
+#include "fit/table_problem.h"
 #include "reference/json_reader.h"
 #include "reference/sample_points.h"
 
@@ -13,278 +19,27 @@ namespace lobefit {
 
 namespace {
 
-/// Which variable of the solver drives which slots of the model's flat parameters.
-struct Variables {
-  std::vector<std::string> names;
-  std::vector<double> lower, upper, start;
-  std::vector<int> variable_of_slot;
-};
-
 constexpr std::array<const char*, 3> channel_suffixes{".r", ".g", ".b"};
 
-/// Where a fit may move a parameter.
-FitBounds bounds_of(const ParameterInfo& info, const FitOptions& options) {
-  const auto given = std::ranges::find(options.bounds, info.name, &FitBounds::name);
-  return given != options.bounds.end() ? *given : FitBounds{std::string(info.name), info.lower, info.upper};
-}
-
-Variables make_variables(const ParameterValues& values, const TableModel& on_table, const FitOptions& options,
-                         int channels) {
-  Variables variables;
-  variables.variable_of_slot.assign(values.flat().size(), -1);
-  for (const std::string& name : options.free) {
-    const ParameterInfo& info = values.info(name);
-    const auto offset = static_cast<std::size_t>(info.offset);
-    if (on_table.set_by_axis(offset)) {
-      throw Error(ExitCode::usage, "parameter '" + name + "' can't be free", values.owner(),
-                  "an axis of the table sets it; leave it out of --free");
-    }
-    if (variables.variable_of_slot[offset] >= 0) {
-      throw Error(ExitCode::usage, "parameter '" + name + "' is free twice", values.owner(), "name it once");
-    }
-    const bool per_channel = info.components == 3 && channels == 3;
-    for (int c = 0; c < info.components; ++c) {
-      const std::size_t slot = offset + static_cast<std::size_t>(c);
-      if (c == 0 || per_channel) {
-        variables.names.push_back(name + (per_channel ? channel_suffixes[static_cast<std::size_t>(c)] : ""));
-        const FitBounds bounds = bounds_of(info, options);
-        variables.lower.push_back(bounds.lower);
-        variables.upper.push_back(bounds.upper);
-        variables.start.push_back(values.flat()[slot]);
-      }
-      variables.variable_of_slot[slot] = static_cast<int>(variables.names.size()) - 1;
-    }
-  }
-  return variables;
-}
-
-/// Entries of one parameter row, small enough to be one unit of parallel work.
-struct Batch {
-  std::size_t parameter_row;
-  std::size_t first_residual;
-  std::vector<std::size_t> entries;
-  std::vector<Direction> wi, wo;
-  std::vector<double> root_weight, cos_theta_i;
-};
-
-constexpr std::size_t batch_size = 1024;
-
-/// The replicate whose numbers fits draw: a table rendered with the same seed has far fewer.
-constexpr std::uint32_t own_stream = ~0u;
-
-struct RobustResidual {
-  double value, slope;
-  double bend;  // by how much the pull on the parameters, value × slope, follows the data: its derivative over slope
-};
-
-/// √ρ(s²) with the sign of s, and its derivative: squaring it gives the loss. ρ as in Ceres: Huber, Cauchy.
-RobustResidual robust(Loss loss, double scale, double residual) {
-  const double s = residual / scale;
-  const double magnitude = std::abs(s);
-  switch (loss) {
-    case Loss::none: break;
-    case Loss::huber: {
-      if (magnitude <= 1.0) break;
-      const double root = std::sqrt(2.0 * magnitude - 1.0);
-      return {std::copysign(scale * root, residual), 1.0 / root, 0.0};  // the pull is constant
-    }
-    case Loss::cauchy: {
-      if (magnitude < 1e-8) break;
-      const double root = std::sqrt(std::log1p(s * s));
-      const double slope = magnitude / ((1.0 + s * s) * root);
-      return {std::copysign(scale * root, residual), slope, (1.0 - s * s) / (square(1.0 + s * s) * slope)};
-    }
-  }
-  return {residual, 1.0, 1.0};
-}
-
-/// The fit as a least-squares problem over a set of entries.
-class TableProblem {
- public:
-  TableProblem(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
-               const std::vector<double>& weights)
-      : dual_(dual_model(model)),
-        table_(table),
-        options_(options),
-        on_table_(model, values, table, options.mappings),
-        variables_(make_variables(values, on_table_, options, table.channels)) {
-    for (std::size_t entry = 0; entry < table.entries(); ++entry) {
-      if (weights[entry] == 0.0) continue;
-      const std::size_t row = table.parameter_row(entry);
-      if (batches_.empty() || batches_.back().parameter_row != row || batches_.back().entries.size() == batch_size) {
-        batches_.push_back({.parameter_row = row, .first_residual = residual_count_});
-      }
-      Batch& batch = batches_.back();
-      batch.entries.push_back(entry);
-      batch.wi.push_back(table.wi(entry));
-      batch.wo.push_back(table.wo(entry));
-      batch.cos_theta_i.push_back(batch.wi.back().z);
-      batch.root_weight.push_back(std::sqrt(weights[entry] / table.channels));
-      residual_count_ += static_cast<std::size_t>(table.channels);
-    }
-  }
-
-  const Variables& variables() const { return variables_; }
-
-  LeastSquaresProblem problem(std::vector<double> start) const {
-    LeastSquaresProblem result;
-    result.residual_count = residual_count_;
-    result.names = variables_.names;
-    result.lower = variables_.lower;
-    result.upper = variables_.upper;
-    result.start = std::move(start);
-    result.maximum_iterations = options_.maximum_iterations;
-    result.evaluate = [this](std::span<const double> x, std::span<double> residuals, double* jacobian) {
-      return evaluate(x, residuals, jacobian);
-    };
-    const bool has_errors =
-        std::any_of(table_.stderr_values.begin(), table_.stderr_values.end(), [](float error) { return error > 0.0f; });
-    if (has_errors) {
-      result.degrees_of_freedom = table_.replicates.empty() ? 0 : replicate_count - 1;
-      result.gradient_covariance = [this](std::span<const double> x, std::span<const double> jacobian) {
-        return gradient_covariance(x, jacobian);
-      };
-    }
-    return result;
-  }
-
- private:
-  std::vector<double> flat_parameters(const Batch& batch, std::span<const double> x) const {
-    std::vector<double> flat = on_table_.row(batch.parameter_row);
-    for (std::size_t s = 0; s < flat.size(); ++s) {
-      if (variables_.variable_of_slot[s] >= 0) flat[s] = x[static_cast<std::size_t>(variables_.variable_of_slot[s])];
-    }
-    return flat;
-  }
-
-  bool evaluate(std::span<const double> x, std::span<double> residuals, double* jacobian) const {
-    const std::size_t p = x.size();
-    const auto channels = static_cast<std::size_t>(table_.channels);
-    std::vector<char> finite(batches_.size(), 1);
-    tbb::parallel_for(std::size_t{0}, batches_.size(), [&](std::size_t index) {
-      const Batch& batch = batches_[index];
-      const std::size_t n = batch.entries.size();
-      const std::vector<double> flat = flat_parameters(batch, x);
-      std::vector<double> values(channels * n), derivatives(channels * n * dual_width);
-      for (std::size_t first = 0; first == 0 || (jacobian && first < p); first += dual_width) {
-        dual_.evaluate(flat, variables_.variable_of_slot, static_cast<int>(first), batch.wi, batch.wo, table_.channels,
-                       values.data(), derivatives.data());
-        for (std::size_t c = 0; c < channels; ++c) {
-          for (std::size_t i = 0; i < n; ++i) {
-            const std::size_t row = batch.first_residual + i * channels + c;
-            const ValueAndSlope model = transform(options_.quantity, values[c * n + i], batch.cos_theta_i[i]);
-            const double target =
-                transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)), batch.cos_theta_i[i])
-                    .value;
-            const RobustResidual residual = robust(options_.loss, options_.loss_scale, model.value - target);
-            residuals[row] = batch.root_weight[i] * residual.value;
-            if (!std::isfinite(residuals[row])) finite[index] = 0;
-            if (!jacobian) continue;
-            const double slope = batch.root_weight[i] * residual.slope * model.slope;
-            for (std::size_t k = first; k < std::min(p, first + dual_width); ++k) {
-              jacobian[row * p + k] = slope * derivatives[(c * n + i) * dual_width + k - first];
-            }
-          }
-        }
-      }
-    });
-    return std::all_of(finite.begin(), finite.end(), [](char f) { return f != 0; });
-  }
-
-  /// Covariance of the cost's gradient under the table's error.
-  std::vector<double> gradient_covariance(std::span<const double> x, std::span<const double> jacobian) const {
-    const std::size_t p = x.size();
-    std::vector<double> covariance(p * p, 0.0);
-    const auto add_product = [&](const std::vector<double>& g, double factor) {
-      for (std::size_t k = 0; k < p; ++k) {
-        for (std::size_t l = 0; l < p; ++l) covariance[k * p + l] += factor * g[k] * g[l];
-      }
-    };
-    const std::vector<double> slopes = data_slopes(x);
-    std::vector<double> g(p);
-    const auto replicates = static_cast<int>(table_.replicates.size() / table_.values.size());
-    if (replicates > 0) {
-      for (int r = 0; r < replicates; ++r) {
-        std::fill(g.begin(), g.end(), 0.0);
-        for_each_residual([&](std::size_t row, std::size_t entry, int c) {
-          const double difference = slopes[row] * (table_.replicate(r, entry, c) - table_.value(entry, c));
-          for (std::size_t k = 0; k < p; ++k) g[k] += jacobian[row * p + k] * difference;
-        });
-        add_product(g, 1.0 / (replicates * (replicates - 1.0)));
-      }
-    } else {
-      for_each_residual([&](std::size_t row, std::size_t entry, int c) {
-        const double error = slopes[row] * table_.standard_error(entry, c);
-        for (std::size_t k = 0; k < p; ++k) g[k] = jacobian[row * p + k] * error;
-        add_product(g, 1.0);
-      });
-    }
-    return covariance;
-  }
-
-  /// By how much each residual's pull moves with its table value, per Jacobian row.
-  std::vector<double> data_slopes(std::span<const double> x) const {
-    const auto channels = static_cast<std::size_t>(table_.channels);
-    std::vector<double> slopes(residual_count_);
-    for (const Batch& batch : batches_) {
-      const std::size_t n = batch.entries.size();
-      std::vector<double> values(channels * n), derivatives(channels * n * dual_width);
-      dual_.evaluate(flat_parameters(batch, x), variables_.variable_of_slot, 0, batch.wi, batch.wo, table_.channels,
-                     values.data(), derivatives.data());
-      for (std::size_t i = 0; i < n; ++i) {
-        for (std::size_t c = 0; c < channels; ++c) {
-          const ValueAndSlope target =
-              transform(options_.quantity, table_.value(batch.entries[i], static_cast<int>(c)), batch.cos_theta_i[i]);
-          const double model = transform(options_.quantity, values[c * n + i], batch.cos_theta_i[i]).value;
-          slopes[batch.first_residual + i * channels + c] =
-              batch.root_weight[i] * target.slope *
-              robust(options_.loss, options_.loss_scale, model - target.value).bend;
-        }
-      }
-    }
-    return slopes;
-  }
-
-  /// Calls visit(row, entry, channel) for every residual.
-  template <class Visit>
-  void for_each_residual(Visit&& visit) const {
-    for (const Batch& batch : batches_) {
-      for (std::size_t i = 0; i < batch.entries.size(); ++i) {
-        for (int c = 0; c < table_.channels; ++c) {
-          visit(batch.first_residual + i * static_cast<std::size_t>(table_.channels) + static_cast<std::size_t>(c),
-                batch.entries[i], c);
-        }
-      }
-    }
-  }
-
-  const DualModel& dual_;
-  const Table& table_;
-  const FitOptions& options_;
-  TableModel on_table_;
-  Variables variables_;
-  std::vector<Batch> batches_;
-  std::size_t residual_count_ = 0;
-};
-
-/// Start number `index` > 0: a scrambled Sobol pair per two variables, inside the ranges.
-std::vector<double> further_start(const Variables& variables, std::uint64_t seed, int index) {
-  std::vector<double> start(variables.start.size());
-  for (std::size_t i = 0; i < start.size(); ++i) {
-    const SamplePoints points(Sampler::sobol, {seed, i / 2, own_stream});
-    const double u = points(static_cast<std::uint32_t>(index))[i % 2];
-    start[i] = variables.lower[i] + u * (variables.upper[i] - variables.lower[i]);
-  }
-  return start;
-}
-
+/// rms_difference() of every quantity, in one pass.
 std::vector<FitMetric> all_metrics(const Table& table, std::span<const float> values,
                                    const std::vector<double>& weights) {
-  std::vector<FitMetric> metrics;
-  for (std::size_t q = 0; q < quantity_names.size(); ++q) {
-    metrics.push_back(
-        {std::string(quantity_names[q]), rms_difference(table, values, static_cast<Quantity>(q), weights)});
+  std::array<double, quantity_names.size()> sums{};
+  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+    if (weights[entry] == 0.0) continue;
+    const double cos_theta_i = table.wi(entry).z;
+    for (int c = 0; c < table.channels; ++c) {
+      const double model = values[static_cast<std::size_t>(c) * table.entries() + entry], truth = table.value(entry, c);
+      for (std::size_t q = 0; q < sums.size(); ++q) {
+        const auto quantity = static_cast<Quantity>(q);
+        sums[q] += weights[entry] * square(transform(quantity, model, cos_theta_i).value -
+                                           transform(quantity, truth, cos_theta_i).value);
+      }
+    }
   }
+  std::vector<FitMetric> metrics;
+  for (std::size_t q = 0; q < sums.size(); ++q)
+    metrics.push_back({std::string(quantity_names[q]), std::sqrt(sums[q] / table.channels)});
   return metrics;
 }
 
@@ -292,6 +47,278 @@ void normalise(std::vector<double>& weights, const char* mend) {
   const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
   if (!(sum > 0.0)) throw Error(ExitCode::usage, "no entry is left", "--holdout", mend);
   for (double& weight : weights) weight /= sum;
+}
+
+/// A tint can't turn the sign of its intensity: products that can be negative keep to the side of their sum.
+void keep_signs(LeastSquaresProblem& problem, const FitVariables& variables) {
+  for (const std::size_t slot : variables.tint) {
+    const auto first = static_cast<std::size_t>(variables.variable_of_slot[slot]);
+    if (problem.lower[first] >= 0.0) continue;
+    const double sum = problem.start[first] + problem.start[first + 1] + problem.start[first + 2];
+    for (std::size_t v = first; v < first + 3; ++v) {
+      (sum < 0.0 ? problem.upper : problem.lower)[v] = 0.0;
+      problem.start[v] = std::clamp(problem.start[v], problem.lower[v], problem.upper[v]);
+    }
+  }
+}
+
+/// Two minima of sorted ones: the first, and the next that is not the same once more.
+void keep_best_two(std::vector<Minimum>& minima, const FitVariables& variables) {
+  const Minimum& best = minima.front();
+  const auto other = std::ranges::find_if(minima, [&](const Minimum& minimum) {
+    for (std::size_t v = 0; v < variables.names.size(); ++v) {
+      const double range = std::min(variables.upper[v] - variables.lower[v], 4.0);
+      if (std::abs(minimum.x[v] - best.x[v]) > 0.05 * range) return true;
+    }
+    return false;
+  });
+  std::vector<Minimum> kept{best};
+  if (other != minima.end()) kept.push_back(*other);
+  minima = std::move(kept);
+}
+
+/// Problems over fewer and fewer entries that stand for the whole one.
+struct Samples {
+  TableProblem whole;
+  std::optional<TableProblem> fine, coarse;
+  std::vector<double> fine_weights;
+
+  Samples(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
+          const std::vector<double>& weights)
+      : whole(model, values, table, options, weights), fine_weights(weights) {
+    if ((options.starts <= 1 && !options.staged) || whole.entries() <= 2 * options.start_entries / 3) return;
+    const EntrySampler sampler(table, weights, options.quantity);
+    const auto sample = [&](std::optional<TableProblem>& problem, std::size_t count, std::uint64_t stream) {
+      if (whole.entries() <= 2 * count) return;
+      const std::vector<double> few = sampler.sample(count, options.seed + stream);
+      problem.emplace(model, values, table, options, few);
+      if (&problem == &fine) fine_weights = few;
+    };
+    sample(fine, options.start_entries, 1);
+    sample(coarse, options.start_entries / 3, 2);
+  }
+  const TableProblem& fine_or_whole() const { return fine ? *fine : whole; }
+  const TableProblem& coarse_or_fine() const { return coarse ? *coarse : fine_or_whole(); }
+};
+
+/// A start without a finite sum loses to any other.
+bool is_better(const Minimum& a, const Minimum& b) {
+  return a.sum_of_squares < b.sum_of_squares || (std::isfinite(a.sum_of_squares) && std::isnan(b.sum_of_squares));
+}
+
+/// Stage by stage from a guess over a coarse sample, the better half on over a finer one.
+std::vector<Minimum> staged_minima(const Samples& samples, const ParameterValues& values, const Table& table,
+                                   const FitOptions& options, double& misfit, Monitor& monitor) {
+  const ParameterValues guessed = with_guess(values, guess_material(table, samples.fine_weights));
+  std::vector<Minimum> minima(static_cast<std::size_t>(options.starts));
+  tbb::parallel_for(std::size_t{0}, minima.size(), [&](std::size_t index) {
+    minima[index] = staged_start(samples.coarse_or_fine(), guessed, options, static_cast<int>(index), monitor);
+    monitor.advance(1);
+  });
+  std::ranges::stable_sort(minima, is_better);
+  minima.resize(std::max<std::size_t>(std::min<std::size_t>(minima.size(), 2), minima.size() / 2));
+  misfit = std::sqrt(minima.front().sum_of_squares);
+  tbb::parallel_for(std::size_t{0}, minima.size(), [&](std::size_t index) {
+    LeastSquaresProblem next = samples.fine_or_whole().with_prior(minima[index].x, options.prior * misfit);
+    keep_signs(next, samples.whole.variables());
+    next.maximum_iterations = 60;
+    next.tolerance = 1e-5;
+    minima[index] = minimise(next, monitor);
+  });
+  std::ranges::stable_sort(minima, is_better);
+  misfit = std::sqrt(minima.front().sum_of_squares);
+  return minima;
+}
+
+/// The best minimum of all starts.
+Minimum search(const Samples& samples, const ParameterValues& values, const Table& table, const FitOptions& options,
+               Monitor& monitor) {
+  const FitVariables& variables = samples.whole.variables();
+  const bool staged = options.staged && !variables.names.empty();
+  double misfit = 0.0;
+  const auto over_all = [&](std::vector<double> start) {
+    LeastSquaresProblem whole = staged ? samples.whole.with_prior(std::move(start), options.prior * misfit)
+                                       : samples.whole.problem(std::move(start));
+    keep_signs(whole, variables);
+    whole.tolerance = options.tolerance;
+    return minimise(whole, monitor);
+  };
+  std::vector<Minimum> minima;
+  if (staged) {
+    minima = staged_minima(samples, values, table, options, misfit, monitor);
+  } else {
+    minima.resize(variables.names.empty() ? 1 : static_cast<std::size_t>(options.starts));
+    tbb::parallel_for(std::size_t{0}, minima.size(), [&](std::size_t index) {
+      LeastSquaresProblem start = samples.fine_or_whole().problem(
+          index == 0 ? variables.start : sobol_start(variables, options.seed, static_cast<int>(index)));
+      start.tolerance = samples.fine ? 1e-6 : options.tolerance;
+      minima[index] = minimise(start, monitor);
+      monitor.advance(1);
+    });
+    std::ranges::stable_sort(minima, is_better);
+  }
+  if (staged || samples.fine) {
+    keep_best_two(minima, variables);
+    for (Minimum& minimum : minima) minimum = over_all(minimum.x);
+  }
+  for (const ParameterValues& other : options.also_from) {
+    minima.push_back(over_all(samples.whole.variables_of(other)));
+    monitor.advance(1);
+  }
+  return *std::ranges::min_element(minima, is_better);
+}
+
+/// A parameter's derivatives by the solver's variables.
+using Slopes = std::vector<std::pair<std::size_t, double>>;
+
+double quadratic_form(const Slopes& a, const Slopes& b, const std::vector<std::vector<double>>& matrix) {
+  double sum = 0.0;
+  for (const auto& [i, slope_i] : a) {
+    for (const auto& [j, slope_j] : b) sum += slope_i * slope_j * matrix[i][j];
+  }
+  return sum;
+}
+
+/// An estimate of `value` from those of the variables that it is made of.
+FittedVariable combine(double value, const Slopes& by, const LeastSquaresSolution& solution) {
+  if (by.size() == 1 && by.front().second == 1.0) return solution.variables[by.front().first];
+  FittedVariable estimate{.value = value};
+  if (!solution.inverse_normal.empty()) {
+    estimate.misfit_standard_error =
+        std::sqrt(std::max(0.0, solution.residual_variance * quadratic_form(by, by, solution.inverse_normal)));
+  }
+  if (!solution.covariance.empty())
+    estimate.standard_error = std::sqrt(std::max(0.0, quadratic_form(by, by, solution.covariance)));
+  estimate.ci_low = value - solution.quantile * estimate.standard_error;
+  estimate.ci_high = value + solution.quantile * estimate.standard_error;
+  estimate.at_bound = !by.empty() && solution.variables[by.front().first].at_bound;
+  for (const auto& [variable, slope] : by)
+    estimate.identifiable = estimate.identifiable && solution.variables[variable].identifiable;
+  return estimate;
+}
+
+/// A product's three variables, and the largest of them, which stands for the intensity.
+struct ProductVariables {
+  std::size_t first, largest;
+  double most;
+
+  ProductVariables(std::size_t first_variable, const LeastSquaresSolution& solution)
+      : first(first_variable), largest(0), most(0.0) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double value = solution.variables[first + c].value;
+      if (std::abs(value) > std::abs(most)) {
+        largest = c;
+        most = value;
+      }
+    }
+  }
+};
+
+/// The model's parameters and their errors, from the solver's variables and theirs.
+void add_parameters(Fit& result, const TableProblem& problem, const LeastSquaresSolution& solution,
+                    const ParameterValues& fitted, const TableModel& on_table) {
+  const FitVariables& variables = problem.variables();
+  const auto variable_at = [&](std::size_t slot) { return static_cast<std::size_t>(variables.variable_of_slot[slot]); };
+  const auto product_of = [&](const std::vector<std::size_t>& slots, std::size_t offset) {
+    const auto found = std::ranges::find(slots, offset);
+    if (found == slots.end()) return std::optional<ProductVariables>();
+    const std::size_t tint = variables.tint[static_cast<std::size_t>(found - slots.begin())];
+    return std::optional(ProductVariables(variable_at(tint), solution));
+  };
+  std::vector<Slopes> slopes;
+  for (const ParameterInfo& info : fitted.list()) {
+    const auto offset = static_cast<std::size_t>(info.offset);
+    if (info.file || on_table.set_by_axis(offset)) continue;
+    const FitBounds bounds = bounds_of(info, result.options);
+    const auto as_intensity = product_of(variables.intensity, offset), as_tint = product_of(variables.tint, offset);
+    const bool grey =
+        info.components == 1 ||
+        (fitted.flat()[offset] == fitted.flat()[offset + 1] && fitted.flat()[offset] == fitted.flat()[offset + 2] &&
+         variables.variable_of_slot[offset] == variables.variable_of_slot[offset + 1]);
+    for (std::size_t c = 0; c < (grey ? 1u : 3u); ++c) {
+      const double value = fitted.flat()[offset + c];
+      FitParameter parameter{.name = std::string(info.name) + (grey ? "" : channel_suffixes[c]),
+                             .estimate = {.value = value, .ci_low = value, .ci_high = value},
+                             .lower = bounds.lower,
+                             .upper = bounds.upper,
+                             .free = as_intensity || variables.variable_of_slot[offset + c] >= 0};
+      if (parameter.free) {
+        Slopes by;
+        if (as_intensity) {
+          by = {{as_intensity->first + as_intensity->largest, 1.0}};
+        } else if (!as_tint) {
+          by = {{variable_at(offset + c), 1.0}};
+        } else if (c != as_tint->largest && as_tint->most != 0.0) {
+          by = {{as_tint->first + c, 1.0 / as_tint->most}, {as_tint->first + as_tint->largest, -value / as_tint->most}};
+        }
+        parameter.estimate = combine(value, by, solution);
+        if (as_tint && as_tint->most == 0.0) parameter.estimate.identifiable = false;
+        slopes.push_back(std::move(by));
+      }
+      result.parameters.push_back(std::move(parameter));
+    }
+  }
+  result.solution = solution;
+  result.solution.variables.clear();
+  for (const FitParameter& p : result.parameters) {
+    if (p.free) result.solution.variables.push_back(p.estimate);
+  }
+  std::vector<std::vector<double>>& correlation = result.solution.correlation;
+  correlation.assign(slopes.size(), std::vector<double>(slopes.size(), 0.0));
+  if (solution.inverse_normal.empty()) return;
+  for (std::size_t k = 0; k < slopes.size(); ++k) {
+    for (std::size_t l = 0; l < slopes.size(); ++l) {
+      const double scale = quadratic_form(slopes[k], slopes[k], solution.inverse_normal) *
+                           quadratic_form(slopes[l], slopes[l], solution.inverse_normal);
+      if (scale > 0.0)
+        correlation[k][l] = quadratic_form(slopes[k], slopes[l], solution.inverse_normal) / std::sqrt(scale);
+    }
+  }
+}
+
+/// Remarks that tell a parameter without effect what takes it away: "terminator_length has no effect while terminator
+/// = 0". Found by trying: another value of one parameter, and the effect comes back.
+void name_what_hides(Fit& result, const Model& model, const ParameterValues& fitted, const Table& table,
+                     const FitOptions& options, const std::vector<double>& weights) {
+  constexpr std::size_t few = 300;
+  const std::vector<double> sample = EntrySampler(table, weights, options.quantity).sample(few, options.seed + 3);
+  const auto effect_of = [&](const ParameterValues& values, const std::string& name) {
+    FitOptions alone = options;
+    alone.free = {name};
+    const TableProblem problem(model, values, table, alone, sample);
+    LeastSquaresProblem squares = problem.problem(problem.variables().start);
+    std::vector<double> residuals(squares.residual_count), jacobian(residuals.size() * squares.names.size());
+    squares.evaluate(squares.start, residuals, jacobian.data());
+    return std::ranges::any_of(jacobian, [](double slope) { return std::abs(slope) > 1e-9; });
+  };
+  const TableModel on_table(model, fitted, table, options.mappings);
+  for (const ParameterInfo& info : fitted.list()) {
+    const std::string name(info.name);
+    if (std::ranges::find(options.free, name) == options.free.end() || effect_of(fitted, name)) continue;
+    std::vector<std::string> causes;
+    for (const ParameterInfo& other : fitted.list()) {
+      if (other.offset == info.offset || other.file || on_table.set_by_axis(static_cast<std::size_t>(other.offset)))
+        continue;
+      const std::span<const double> now = fitted.components(other);
+      // An intensity's range is wide and its neutral value 1: values near both ends of [0, 4] try it.
+      const double upper = std::min(other.upper, other.lower + 4.0);
+      for (const double share : {0.15, 0.85}) {
+        ParameterValues changed = fitted;
+        const double value =
+            other.choices.empty() ? other.lower + share * (upper - other.lower) : std::round(share * other.upper);
+        changed.set(other.name, std::vector<double>(now.size(), value));
+        if (!effect_of(changed, name)) continue;
+        causes.push_back(fmt::format("{} = {:.4g}", other.name, now[0]));
+        break;
+      }
+    }
+    if (causes.empty()) continue;
+    const std::string remark = name + " has no effect while " + fmt::format("{}", fmt::join(causes, " or "));
+    std::erase_if(result.solution.remarks, [&](const std::string& text) {
+      return text.find(name) != std::string::npos && text.find("has no effect on these data") != std::string::npos;
+    });
+    result.solution.remarks.push_back(remark);
+  }
 }
 
 }  // namespace
@@ -307,69 +334,51 @@ std::vector<std::string> free_parameters(const ParameterValues& values, const Ta
   return names;
 }
 
+HeldOut held_out_weights(const Table& table, const FitOptions& options) {
+  HeldOut parts{.fitted = entry_weights(table, options.weights, options.quantity)};
+  if (options.holdout <= 0.0) return parts;
+  parts.held_out = parts.fitted;
+  for (std::size_t entry = 0; entry < parts.fitted.size(); ++entry) {
+    if (parts.fitted[entry] == 0.0) continue;
+    const std::uint64_t stream =
+        options.holdout_blocks ? static_cast<std::uint64_t>(direction_block(table.wi(entry), table.wo(entry))) : entry;
+    const double u = SamplePoints(Sampler::philox, {options.seed, stream, own_stream})(0)[0];
+    (u < options.holdout ? parts.fitted : parts.held_out)[entry] = 0.0;
+  }
+  normalise(parts.fitted, "hold out a smaller fraction");
+  normalise(parts.held_out, "hold out a larger fraction, or none");
+  return parts;
+}
+
 Fit fit(const Model& model, const ParameterValues& values, const Table& table, const FitOptions& options,
         Monitor& monitor) {
-  std::vector<double> weights = entry_weights(table, options.weights, options.quantity);
-  std::vector<double> held_out;
-  if (options.holdout > 0.0) {
-    held_out = weights;
-    for (std::size_t entry = 0; entry < weights.size(); ++entry) {
-      const double u = SamplePoints(Sampler::philox, {options.seed, entry, own_stream})(0)[0];
-      (u < options.holdout ? weights : held_out)[entry] = 0.0;
-    }
-    normalise(weights, "hold out a smaller fraction");
-    normalise(held_out, "hold out a larger fraction, or none");
-  }
-  const TableProblem problem(model, values, table, options, weights);
-  const Variables& variables = problem.variables();
+  const HeldOut parts = held_out_weights(table, options);
+  std::vector<double> weights = parts.fitted;
+  if (options.most_entries > 0)
+    weights = EntrySampler(table, weights, options.quantity).sample(options.most_entries, options.seed);
+  const Samples samples(model, values, table, options, weights);
+  const TableProblem& problem = samples.whole;
 
   Fit result;
   result.model = std::string(model.info->name);
   result.options = options;
   result.mappings = options.mappings;
-  result.starts_tried = variables.names.empty() ? 1 : options.starts;
+  result.entries = problem.entries();
+  result.starts_tried = problem.variables().names.empty() ? 1 : options.starts;
+  result.starts_tried += static_cast<int>(options.also_from.size());
   monitor.begin("fit " + result.model, static_cast<std::uint64_t>(result.starts_tried));
-  for (int start = 0; start < result.starts_tried; ++start) {
-    const LeastSquaresSolution solution =
-        solve(problem.problem(start == 0 ? variables.start : further_start(variables, options.seed, start)), monitor);
-    // Written so that a first start without a finite sum loses to any other.
-    if (start == 0 || !(result.solution.sum_of_squares <= solution.sum_of_squares)) result.solution = solution;
-    monitor.advance(1);
-  }
+  const Minimum best = search(samples, values, table, options, monitor);
   monitor.end();
+  const LeastSquaresProblem whole = problem.problem(best.x, samples.fine ? &*samples.fine : nullptr);
+  const LeastSquaresSolution solution = analyse(whole, best);
 
-  ParameterValues fitted = values;
-  for (std::size_t slot = 0; slot < fitted.flat().size(); ++slot) {
-    const int variable = variables.variable_of_slot[slot];
-    if (variable >= 0) fitted.flat()[slot] = result.solution.variables[static_cast<std::size_t>(variable)].value;
-  }
+  const ParameterValues fitted = problem.values_at(best.x);
   const TableModel on_table(model, fitted, table, options.mappings);
-  for (const ParameterInfo& info : fitted.list()) {
-    const auto offset = static_cast<std::size_t>(info.offset);
-    if (on_table.set_by_axis(offset)) continue;
-    const bool grey =
-        info.components == 1 ||
-        (fitted.flat()[offset] == fitted.flat()[offset + 1] && fitted.flat()[offset] == fitted.flat()[offset + 2] &&
-         variables.variable_of_slot[offset] == variables.variable_of_slot[offset + 1]);
-    for (std::size_t c = 0; c < (grey ? 1u : 3u); ++c) {
-      const FitBounds bounds = bounds_of(info, options);
-      FitParameter parameter{.name = std::string(info.name) + (grey ? "" : channel_suffixes[c]),
-                             .lower = bounds.lower,
-                             .upper = bounds.upper};
-      const int variable = variables.variable_of_slot[offset + c];
-      parameter.free = variable >= 0;
-      if (parameter.free) {
-        parameter.estimate = result.solution.variables[static_cast<std::size_t>(variable)];
-      } else {
-        const double value = fitted.flat()[offset + c];
-        parameter.estimate = {.value = value, .ci_low = value, .ci_high = value};
-      }
-      result.parameters.push_back(std::move(parameter));
-    }
-  }
+  add_parameters(result, problem, solution, fitted, on_table);
+  if (!result.solution.identifiable) name_what_hides(result, model, fitted, table, options, weights);
   const Table rendered = on_table.render();
-  result.metrics = all_metrics(table, rendered.values, weights);
-  if (!held_out.empty()) result.holdout = all_metrics(table, rendered.values, held_out);
+  result.metrics = all_metrics(table, rendered.values, parts.fitted);
+  if (!parts.held_out.empty()) result.holdout = all_metrics(table, rendered.values, parts.held_out);
   return result;
 }
 
@@ -395,15 +404,11 @@ ParameterValues Fit::values() const {
   return result;
 }
 
-namespace {
-
 Json metrics_json(const std::vector<FitMetric>& metrics) {
   Json json = Json::object();
   for (const FitMetric& metric : metrics) json[metric.name] = metric.value;
   return json;
 }
-
-}  // namespace
 
 Json estimate_json(const FitParameter& p) {
   return {{"value", p.estimate.value},
@@ -440,6 +445,8 @@ Json Fit::json(const std::string& command, const std::string& table_sha256) cons
        {{"converged", solution.converged},
         {"iterations", solution.iterations},
         {"starts", starts_tried},
+        {"entries", entries},
+        {"intervals", intervals_names[static_cast<std::size_t>(options.intervals)]},
         {"message", solution.termination},
         {"metric", quantity_names[static_cast<std::size_t>(options.quantity)]},
         {"weights", weight_names(options.weights)},

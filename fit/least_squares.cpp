@@ -7,6 +7,9 @@
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <exception>
+#include <limits>
+
+#include "fit/box_steps.h"
 
 namespace lobefit {
 
@@ -15,6 +18,32 @@ namespace {
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr std::size_t residuals_per_block = 1024;
+
+/// The normal equations of residuals and their Jacobian.
+NormalEquations normal_equations(std::span<const double> residuals, std::span<const double> jacobian,
+                                 std::size_t variables) {
+  const auto n = static_cast<Eigen::Index>(residuals.size());
+  const auto p = static_cast<Eigen::Index>(variables);
+  const Eigen::Map<const RowMatrix> j(jacobian.data(), n, p);
+  const Eigen::Map<const Eigen::VectorXd> r(residuals.data(), n);
+  NormalEquations result{.sum_of_squares = r.squaredNorm(),
+                         .gradient = std::vector<double>(variables),
+                         .normal = std::vector<double>(variables * variables)};
+  Eigen::Map<Eigen::VectorXd>(result.gradient.data(), p) = j.transpose() * r;
+  Eigen::Map<RowMatrix>(result.normal.data(), p, p) = j.transpose() * j;
+  return result;
+}
+
+NormalEquations normal_equations(const LeastSquaresProblem& problem, std::span<const double> x) {
+  if (problem.condense) {
+    NormalEquations result;
+    problem.condense(x, true, result);
+    return result;
+  }
+  std::vector<double> residuals(problem.residual_count), jacobian(problem.residual_count * x.size());
+  problem.evaluate(x, residuals, jacobian.data());
+  return normal_equations(residuals, jacobian, x.size());
+}
 
 /// Residuals and Jacobian at Ceres' current point, computed once for all blocks.
 class Cache : public ceres::EvaluationCallback {
@@ -125,7 +154,7 @@ constexpr double threshold = 1e-12;
 /// Finds the directions in which the residuals don't change, and marks their variables. A variable at its bound takes
 /// part where the direction leads inside.
 void name_open_directions(const LeastSquaresProblem& problem, std::span<const double> x,
-                          const Eigen::Map<const RowMatrix>& j, LeastSquaresSolution& solution) {
+                          const Eigen::Map<const RowMatrix>& normal, LeastSquaresSolution& solution) {
   std::vector<Eigen::Index> effective;
   std::vector<std::string> names;
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -134,10 +163,10 @@ void name_open_directions(const LeastSquaresProblem& problem, std::span<const do
     names.push_back(problem.names[i]);
   }
   if (effective.empty()) return;
-  const Eigen::MatrixXd columns = j(Eigen::all, effective);
-  const Eigen::VectorXd scale = columns.colwise().norm();
-  const Eigen::MatrixXd scaled = columns * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled);
+  const Eigen::MatrixXd part = normal(effective, effective);
+  const Eigen::VectorXd scale = part.diagonal().cwiseSqrt();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.cwiseInverse().asDiagonal() * part *
+                                                             scale.cwiseInverse().asDiagonal());
   for (Eigen::Index k = 0; k < scale.size() && eigen.eigenvalues()[k] <= threshold; ++k) {
     const Eigen::VectorXd v = eigen.eigenvectors().col(k);
     bool forwards = true, backwards = true;
@@ -159,15 +188,52 @@ void name_open_directions(const LeastSquaresProblem& problem, std::span<const do
   }
 }
 
-/// Fills in errors, intervals, correlation and identifiability at the solution.
-void analyse(const LeastSquaresProblem& problem, std::span<const double> x, LeastSquaresSolution& solution) {
+/// Σ r ∇²r between the `active` variables, by central differences of the gradient. How an optimum moves with the data
+/// is the inverse of the whole Hessian JᵀJ + Σ r ∇²r: where a model can't meet the data, the second term counts.
+Eigen::MatrixXd second_order(const LeastSquaresProblem& problem, std::span<const double> x,
+                             const std::vector<Eigen::Index>& active) {
+  const auto p = static_cast<Eigen::Index>(x.size());
+  const auto m = static_cast<Eigen::Index>(active.size());
+  std::vector<double> moved(x.begin(), x.end());
+  const auto equations = [&](std::span<const double> at) {
+    if (!problem.curvature_sample) return normal_equations(problem, at);
+    NormalEquations result;
+    problem.curvature_sample(at, true, result);
+    return result;
+  };
+  const auto gradient = [&](std::size_t i, double value) {
+    moved[i] = value;
+    const NormalEquations at = equations(moved);
+    moved[i] = x[i];
+    return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(at.gradient.data(), p));
+  };
+  Eigen::MatrixXd hessian(m, m);
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const auto i = static_cast<std::size_t>(active[static_cast<std::size_t>(k)]);
+    const double room = std::min(problem.upper[i] - x[i], x[i] - problem.lower[i]);
+    const double step = std::min(1e-5 * std::max(1e-2, std::abs(x[i])), 0.5 * room);
+    const Eigen::VectorXd column = (gradient(i, x[i] + step) - gradient(i, x[i] - step)) / (2.0 * step);
+    hessian.col(k) = column(active);
+  }
+  const NormalEquations here = equations(x);
+  const Eigen::Map<const RowMatrix> normal(here.normal.data(), p, p);
+  return 0.5 * (hessian + hessian.transpose()) - normal(active, active);
+}
+
+}  // namespace
+
+LeastSquaresSolution analyse(const LeastSquaresProblem& problem, const Minimum& minimum) {
+  const std::span<const double> x = minimum.x;
   const auto n = static_cast<Eigen::Index>(problem.residual_count);
   const auto p = static_cast<Eigen::Index>(x.size());
-  std::vector<double> residuals(problem.residual_count), jacobian(problem.residual_count * x.size());
-  problem.evaluate(x, residuals, jacobian.data());
-  const Eigen::Map<const RowMatrix> j(jacobian.data(), n, p);
-  const Eigen::Map<const Eigen::VectorXd> r(residuals.data(), n);
-  solution.sum_of_squares = r.squaredNorm();
+  LeastSquaresSolution solution;
+  solution.converged = minimum.converged;
+  solution.iterations = minimum.iterations;
+  solution.termination = minimum.termination;
+  for (const double value : x) solution.variables.push_back({.value = value, .ci_low = value, .ci_high = value});
+  const NormalEquations equations = normal_equations(problem, x);
+  const Eigen::Map<const RowMatrix> normal(equations.normal.data(), p, p);
+  solution.sum_of_squares = equations.sum_of_squares;
 
   // Variables that the errors can be computed for: not at a bound, and with an effect. A variable without effect is
   // one whose column vanishes against the largest, each scaled by its own range.
@@ -176,7 +242,7 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
   for (Eigen::Index k = 0; k < p; ++k) {
     const auto i = static_cast<std::size_t>(k);
     const double range = problem.upper[i] - problem.lower[i];
-    effect[i] = j.col(k).norm() * (std::isfinite(range) ? range : std::max(1.0, std::abs(x[i])));
+    effect[i] = std::sqrt(normal(k, k)) * (std::isfinite(range) ? range : std::max(1.0, std::abs(x[i])));
     largest = std::max(largest, effect[i]);
   }
   std::vector<Eigen::Index> active;
@@ -194,57 +260,36 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
       active.push_back(static_cast<Eigen::Index>(i));
     }
   }
-  name_open_directions(problem, x, j, solution);
+  name_open_directions(problem, x, normal, solution);
   const auto m = static_cast<Eigen::Index>(active.size());
   solution.correlation.assign(x.size(), std::vector<double>(x.size(), 0.0));
+  solution.inverse_normal = solution.correlation;
+  if (problem.gradient_covariance) solution.covariance = solution.correlation;
   if (m == 0) {
     solution.identifiable = std::all_of(solution.variables.begin(), solution.variables.end(),
                                         [](const FittedVariable& v) { return v.identifiable; });
-    return;
+    return solution;
   }
 
-  Eigen::MatrixXd ja(n, m);
-  Eigen::VectorXd scale(m);
-  for (Eigen::Index k = 0; k < m; ++k) {
-    scale[k] = j.col(active[static_cast<std::size_t>(k)]).norm();
-    ja.col(k) = j.col(active[static_cast<std::size_t>(k)]) / scale[k];
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(ja.transpose() * ja);
+  const Eigen::MatrixXd active_normal = normal(active, active);
+  const Eigen::VectorXd scale = active_normal.diagonal().cwiseSqrt();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.cwiseInverse().asDiagonal() * active_normal *
+                                                             scale.cwiseInverse().asDiagonal());
   const Eigen::VectorXd inverse_values =
       eigen.eigenvalues().unaryExpr([&](double v) { return v > threshold ? 1.0 / v : 0.0; });
   const Eigen::MatrixXd inverse_normal =
       scale.cwiseInverse().asDiagonal() *
       (eigen.eigenvectors() * inverse_values.asDiagonal() * eigen.eigenvectors().transpose()).eval() *
       scale.cwiseInverse().asDiagonal();
-  const double variance = n > p ? solution.sum_of_squares / static_cast<double>(n - p) : 0.0;
+  solution.residual_variance = n > p ? solution.sum_of_squares / static_cast<double>(n - p) : 0.0;
 
   Eigen::MatrixXd data_covariance = Eigen::MatrixXd::Zero(m, m);
   if (problem.gradient_covariance) {
-    const std::vector<double> flat = problem.gradient_covariance(x, jacobian);
+    const std::vector<double> flat = problem.gradient_covariance(x);
     const Eigen::Map<const RowMatrix> full(flat.data(), p, p);
     const Eigen::MatrixXd gradient_covariance = full(active, active);
-    // How the optimum moves with the data is the inverse of the whole Hessian JᵀJ + Σ r ∇²r: where a model can't meet
-    // the data, the second term counts. It comes from central differences of the gradient.
-    Eigen::MatrixXd hessian(m, m);
-    std::vector<double> moved(x.begin(), x.end()), r2(residuals.size()), j2(jacobian.size());
-    const auto gradient = [&](std::size_t i, double value) {
-      moved[i] = value;
-      problem.evaluate(moved, r2, j2.data());
-      moved[i] = x[i];
-      const Eigen::Map<const RowMatrix> jacobian2(j2.data(), n, p);
-      const Eigen::Map<const Eigen::VectorXd> residuals2(r2.data(), n);
-      return Eigen::VectorXd(jacobian2.transpose() * residuals2);
-    };
-    for (Eigen::Index k = 0; k < m; ++k) {
-      const auto i = static_cast<std::size_t>(active[static_cast<std::size_t>(k)]);
-      const double room = std::min(problem.upper[i] - x[i], x[i] - problem.lower[i]);
-      const double step = std::min(1e-5 * std::max(1e-2, std::abs(x[i])), 0.5 * room);
-      const Eigen::VectorXd column = (gradient(i, x[i] + step) - gradient(i, x[i] - step)) / (2.0 * step);
-      hessian.col(k) = column(active);
-    }
-    const Eigen::MatrixXd symmetric = scale.cwiseInverse().asDiagonal() *
-                                      (0.5 * (hessian + hessian.transpose())).eval() *
-                                      scale.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd hessian = active_normal + second_order(problem, x, active);
+    const Eigen::MatrixXd symmetric = scale.cwiseInverse().asDiagonal() * hessian * scale.cwiseInverse().asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> curvature(symmetric);
     const Eigen::VectorXd inverse_curvature =
         curvature.eigenvalues().unaryExpr([&](double v) { return v > threshold ? 1.0 / v : 0.0; });
@@ -254,47 +299,60 @@ void analyse(const LeastSquaresProblem& problem, std::span<const double> x, Leas
         scale.cwiseInverse().asDiagonal();
     data_covariance = inverse_hessian * gradient_covariance * inverse_hessian;
   }
-  const double quantile = problem.degrees_of_freedom > 0
-                              ? boost::math::quantile(boost::math::students_t(problem.degrees_of_freedom), 0.975)
-                              : boost::math::quantile(boost::math::normal(), 0.975);
+  solution.quantile = problem.degrees_of_freedom > 0
+                          ? boost::math::quantile(boost::math::students_t(problem.degrees_of_freedom), 0.975)
+                          : boost::math::quantile(boost::math::normal(), 0.975);
   for (Eigen::Index k = 0; k < m; ++k) {
-    FittedVariable& variable = solution.variables[static_cast<std::size_t>(active[static_cast<std::size_t>(k)])];
-    variable.misfit_standard_error = std::sqrt(variance * inverse_normal(k, k));
+    const auto row = static_cast<std::size_t>(active[static_cast<std::size_t>(k)]);
+    FittedVariable& variable = solution.variables[row];
+    variable.misfit_standard_error = std::sqrt(solution.residual_variance * inverse_normal(k, k));
     variable.standard_error = std::sqrt(std::max(0.0, data_covariance(k, k)));
-    variable.ci_low = variable.value - quantile * variable.standard_error;
-    variable.ci_high = variable.value + quantile * variable.standard_error;
+    variable.ci_low = variable.value - solution.quantile * variable.standard_error;
+    variable.ci_high = variable.value + solution.quantile * variable.standard_error;
     for (Eigen::Index l = 0; l < m; ++l) {
+      const auto column = static_cast<std::size_t>(active[static_cast<std::size_t>(l)]);
       const double product = inverse_normal(k, k) * inverse_normal(l, l);
-      solution.correlation[static_cast<std::size_t>(active[static_cast<std::size_t>(k)])]
-                          [static_cast<std::size_t>(active[static_cast<std::size_t>(l)])] =
-          product > 0.0 ? inverse_normal(k, l) / std::sqrt(product) : 0.0;
+      solution.correlation[row][column] = product > 0.0 ? inverse_normal(k, l) / std::sqrt(product) : 0.0;
+      solution.inverse_normal[row][column] = inverse_normal(k, l);
+      if (problem.gradient_covariance) solution.covariance[row][column] = data_covariance(k, l);
     }
   }
   for (const FittedVariable& variable : solution.variables) {
     solution.identifiable = solution.identifiable && variable.identifiable;
   }
+  return solution;
+}
+
+namespace {
+
+double sum_of_squares(const LeastSquaresProblem& problem, std::span<const double> x) {
+  std::vector<double> residuals(problem.residual_count);
+  if (!problem.evaluate(x, residuals, nullptr)) return std::numeric_limits<double>::infinity();
+  return Eigen::Map<const Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size())).squaredNorm();
 }
 
 }  // namespace
 
-LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor) {
+Minimum minimise(const LeastSquaresProblem& problem, Monitor& monitor) {
+  if (problem.condense) return minimise_in_box(problem, monitor);
   const std::size_t variables = problem.names.size();
-  LeastSquaresSolution solution;
-  solution.variables.resize(variables);
-  std::vector<double> x = problem.start;
+  Minimum solution{.x = problem.start};
+  std::vector<double>& x = solution.x;
   if (variables > 0) {
     Cache cache(problem, x.data(), monitor);
     // Ceres steps into a bound and projects; with the bound pressed against, its steps shrink until it takes standing
     // still for convergence. So a variable that the cost presses against its bound is held there, and let go once the
     // cost falls inwards.
+    constexpr int for_good = 2;
     std::vector<int> held(variables, 0);
+    for (std::size_t i = 0; i < problem.fixed.size(); ++i) held[i] = problem.fixed[i] != 0 ? for_good : 0;
     const auto most_passes = static_cast<int>(4 * variables + 4);
     for (int pass = 0; pass < most_passes; ++pass) {
       ceres::Problem::Options problem_options;
       problem_options.evaluation_callback = &cache;
       ceres::Problem ceres_problem(problem_options);
-      for (std::size_t first = 0; first < problem.residual_count; first += residuals_per_block) {
-        const std::size_t count = std::min(residuals_per_block, problem.residual_count - first);
+      for (std::size_t first = 0; first < cache.residuals.size(); first += residuals_per_block) {
+        const std::size_t count = std::min(residuals_per_block, cache.residuals.size() - first);
         ceres_problem.AddResidualBlock(new Block(cache, first, count, variables), nullptr, x.data());
       }
       std::vector<int> constant;
@@ -307,20 +365,19 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor)
       }
       if (constant.size() == variables) {
         solution.converged = true;
-        solution.termination = "every variable is held at a bound";
+        solution.termination = "every variable is held";
       } else {
         if (!constant.empty()) {
           ceres_problem.SetManifold(x.data(), new ceres::SubsetManifold(static_cast<int>(variables), constant));
         }
         ceres::Solver::Options options;
-        // QR keeps the digits that ill-conditioned problems need; large ones are well overdetermined and can spare
-        // them.
-        options.linear_solver_type =
-            problem.residual_count * variables < 4'000'000 ? ceres::DENSE_QR : ceres::DENSE_NORMAL_CHOLESKY;
+        options.linear_solver_type = ceres::DENSE_QR;  // keeps the digits that ill-conditioned problems need
         options.max_num_iterations = std::max(1, problem.maximum_iterations - solution.iterations);
-        options.function_tolerance = 1e-15;
+        options.function_tolerance = problem.tolerance;
         options.parameter_tolerance = 1e-13;
         options.gradient_tolerance = 1e-15;
+        // Cubic steps would ask for a Jacobian at every trial.
+        options.line_search_interpolation_type = ceres::QUADRATIC;
         options.num_threads = 1;
         options.logging_type = ceres::SILENT;
         options.update_state_every_iteration = true;
@@ -337,8 +394,10 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor)
       }
       cache.PrepareForEvaluation(true, true);
       if (cache.failure) std::rethrow_exception(cache.failure);
+      if (!cache.valid) break;
       bool changed = false;
       for (std::size_t i = 0; i < variables; ++i) {
+        if (held[i] == for_good) continue;
         const int side = cache.pressed(i);
         changed = changed || side != held[i];
         held[i] = side;
@@ -350,11 +409,12 @@ LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor)
     solution.converged = true;
     solution.termination = "nothing was free";
   }
-  for (std::size_t i = 0; i < variables; ++i) {
-    solution.variables[i].value = solution.variables[i].ci_low = solution.variables[i].ci_high = x[i];
-  }
-  analyse(problem, x, solution);
+  solution.sum_of_squares = sum_of_squares(problem, x);
   return solution;
+}
+
+LeastSquaresSolution solve(const LeastSquaresProblem& problem, Monitor& monitor) {
+  return analyse(problem, minimise(problem, monitor));
 }
 
 }  // namespace lobefit

@@ -44,14 +44,24 @@ std::vector<double> Axis::weights() const {
   return result;
 }
 
+Grid Grid::measured() {
+  const auto midpoints = [](const char* name, int count, double end) {
+    Axis axis{name, "degree", {}, true};
+    for (int k = 0; k < count; ++k) axis.values.push_back((k + 0.5) * end / count);
+    return axis;
+  };
+  return {midpoints("theta_i", 45, 80.0), midpoints("theta_o", 45, 80.0), midpoints("phi", 90, 180.0)};
+}
+
 Grid Grid::named_or_file(const std::string& name, bool sphere) {
   if (name == "small") return regular(9, 10.0, 10, 20.0);
   if (name == "default") return regular(18, 5.0, 19, 10.0);
   if (name == "fine") return regular(36, 2.5, 37, 5.0);
+  if (name == "measured") return measured();
   std::error_code ignored;
   if (!std::filesystem::exists(name, ignored)) {
     throw Error(ExitCode::usage, "unknown grid '" + name + "'", "--grid",
-                "choose small, default, fine, or a JSON file {\"theta_i\":[…],\"theta_o\":[…],\"phi\":[…]}");
+                "choose small, default, fine, measured, or a JSON file {\"theta_i\":[…],\"theta_o\":[…],\"phi\":[…]}");
   }
   return from_json(parse_json(read_file(name), name), name, sphere);
 }

@@ -43,7 +43,10 @@ struct Axis {
 struct Grid {
   Axis theta_i, theta_o, phi;
 
-  /// "small" (9 × 9 × 10), "default" (18 × 18 × 19), "fine" (36 × 36 × 37), or a JSON file of angles.
+  /// Where isotropic measurements are fitted and scored: midpoints of 45 steps over 0…80° in both polar angles and of
+  /// 90 over 0…180° in azimuth.
+  static Grid measured();
+  /// "small" (9 × 9 × 10), "default" (18 × 18 × 19), "fine" (36 × 36 × 37), "measured", or a JSON file of angles.
   static Grid named_or_file(const std::string& name, bool sphere = false);
   /// From {"theta_i": […], "theta_o": […], "phi": […], "midpoints": false}; `place` names the file in errors.
   static Grid from_json(const Json& json, const std::string& place, bool sphere = false);

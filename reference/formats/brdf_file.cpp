@@ -86,7 +86,7 @@ BrdfFile read_brdf_file(const std::filesystem::path& path, const ReadOptions& op
 
 Table read_table(const std::filesystem::path& path) { return read_brdf_file(path).table; }
 
-Table BrdfFile::resampled(const Grid& grid) const {
+Table BrdfFile::resampled(const Grid& grid, bool nearest_bin) const {
   Table result;
   result.grid = grid;
   result.parameter_axes = table.parameter_axes;
@@ -96,7 +96,15 @@ Table BrdfFile::resampled(const Grid& grid) const {
   result.method = table.method;
   result.version = LOBEFIT_VERSION;
   result.allocate();
+  const bool by_bin = nearest_bin && Merl::has_grid(table);
   for (std::size_t entry = 0; entry < result.entries(); ++entry) {
+    if (by_bin) {
+      const std::size_t bin = Merl::bin_of(result.wi(entry), result.wo(entry));
+      result.valid[entry] = table.valid[bin];
+      for (int c = 0; c < result.channels; ++c)
+        result.values[static_cast<std::size_t>(c) * result.entries() + entry] = table.value(bin, c);
+      continue;
+    }
     try {
       const Rgb f = evaluate(result.wi(entry), result.wo(entry), result.parameter_row(entry));
       const std::array<double, 3> components{f.x, f.y, f.z};

@@ -38,8 +38,9 @@ struct BrdfFile {
   Rgb evaluate(const Direction& wi, const Direction& wo, std::size_t row = 0) const {
     return rgl ? rgl->evaluate(wi, wo) : table.interpolate(row, wi, wo);
   }
-  /// On a grid of angles; masked where the file has no value.
-  Table resampled(const Grid& grid) const;
+  /// On a grid of angles; masked where the file has no value. `nearest_bin`: MERL tables give the bin that a pair falls
+  /// into, as published scores take them, in the place of an interpolation.
+  Table resampled(const Grid& grid, bool nearest_bin = false) const;
   /// One parameter row alone.
   BrdfFile row_slice(std::size_t row) const { return {format, table.row_slice(row), rgl}; }
 };
