@@ -12,4 +12,7 @@ void register_model_batches();
 /// The microfacet-diffuse reference: facets, samples (facet × direction pairs), quadrature.
 void register_integrator();
 
+/// A staged fit of a measured material against evaluating the model once at its directions.
+void register_material_fit();
+
 }  // namespace lobefit

@@ -70,6 +70,7 @@ int main(int argc, char** argv) {
 
   lobefit::register_model_batches();
   lobefit::register_integrator();
+  lobefit::register_material_fit();
   lobefit::RatioTable table;
   benchmark::RunSpecifiedBenchmarks(&table);
   benchmark::Shutdown();

@@ -7,6 +7,7 @@
 #include "cli/fit_text.h"
 #include "reference/formats/neural_brdf.h"
 #include "reference/output_file.h"
+#include "report/material_figure.h"
 
 namespace lobefit {
 
@@ -16,7 +17,8 @@ struct FitArguments {
   std::string model, output;
   std::vector<std::string> tables, materials;
   FitSettings settings;
-  bool resume = false;
+  std::string figure;
+  bool resume = false, figures = false;
 };
 
 /// Every file, or every chosen material of the files that hold several.
@@ -43,11 +45,14 @@ void run_one(const FitArguments& a, const FitSource& source, const Context& cont
   std::optional<OutputFile> file;
   if (!a.output.empty()) file.emplace(a.output, context.force);
   const auto monitor = context.monitor();
-  const FitJob job = run_fit(a.settings, source, context, *monitor);
+  FitSettings settings = a.settings;
+  settings.figure = !a.figure.empty();
+  const FitJob job = run_fit(settings, source, context, *monitor);
   if (file) {
     file->write(job.document.dump(2) + "\n");
     file->commit();
   }
+  if (settings.figure) write_figure(job.figure, a.figure, context.force, material_figure_size());
   if (context.json) {
     std::cout << job.document.dump(2) << "\n";
   } else {
@@ -132,6 +137,8 @@ void add_fit(CLI::App& app, Context& context) {
           "--holdout", settings.holdout,
           "Fraction of entries kept out of the fit and scored; of dense measurements whole blocks of directions")
       ->check(CLI::Range(0.0, 0.9));
+  verb->add_option("--figure", a->figure, "Slices of table and fit to draw (.svg or .png)");
+  verb->add_flag("--figures", a->figures, "Of several materials: NAME.svg beside each fit");
   verb->add_flag("--resume", a->resume, "Of several materials: keep the fits that the folder holds already");
   verb->callback([&context, a] {
     a->settings.model = &find_model(a->model);
@@ -143,6 +150,7 @@ void add_fit(CLI::App& app, Context& context) {
     } else if (a->output.empty()) {
       throw Error(ExitCode::usage, "several materials, and nowhere to write their fits", "-o", "name a folder");
     } else {
+      a->settings.figure = a->figures;
       run_fit_batch(a->settings, sources, a->output, a->resume, context);
     }
   });

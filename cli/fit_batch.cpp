@@ -9,6 +9,7 @@
 
 #include "reference/json_reader.h"
 #include "reference/output_file.h"
+#include "report/material_figure.h"
 
 namespace lobefit {
 
@@ -239,6 +240,7 @@ void run_fit_batch(const FitSettings& settings, const std::vector<FitSource>& so
       try {
         FitJob job = run_fit(settings, source, context, quiet);
         write_file(path, job.document.dump(2) + "\n");
+        if (settings.figure) write_figure(job.figure, folder / (outcome.name + ".svg"), true, material_figure_size());
         outcome.document = std::move(job.document);
       } catch (const Error& error) {
         if (error.code() == ExitCode::interrupted || error.code() == ExitCode::failure) throw;

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "reference/output_file.h"
+#include "report/material_figure.h"
 
 namespace lobefit {
 
@@ -155,6 +156,13 @@ FitJob run_fit(const FitSettings& settings, const FitSource& source, const Conte
   if (!source.material.empty()) job.document["provenance"]["material"] = source.material;
   job.document["provenance"]["grid"] = job.grid;
   if (!job.tiers.empty()) job.document["tiers"] = tiers_json(job.tiers);
+  if (settings.figure) {
+    const auto fitted = TableModel(*settings.model, job.fit.values(), table, job.fit.mappings).render();
+    const auto rms = std::ranges::find(job.fit.metrics, settings.metric, &FitMetric::name);
+    job.figure = material_figure(table, fitted.values, source.name() + " and " + job.fit.model,
+                                 fmt::format("points: {}; lines: fit, rms {} {:.4g}", dense ? "measured" : "table",
+                                             settings.metric, rms->value));
+  }
   return job;
 }
 

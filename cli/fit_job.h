@@ -19,7 +19,7 @@ struct FitSettings {
   std::optional<std::size_t> directions;
   double holdout = 0.0, prior = 0.05;
   int lobes = 2;
-  bool staged = false, not_staged = false, compare_tiers = false;
+  bool staged = false, not_staged = false, compare_tiers = false, figure = false;
 };
 
 /// A material: a file, or one of several in a file.
@@ -34,6 +34,7 @@ struct FitJob {
   Fit fit;
   std::vector<TierFit> tiers;  // empty unless they were compared
   std::string grid;            // "native" or a grid's name
+  std::string figure;          // a gnuplot program, if the settings ask for one
   Json document;
 };
 
