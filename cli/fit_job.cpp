@@ -124,6 +124,23 @@ FitOptions options_of(const FitSettings& settings, bool measured, const Context&
   return options;
 }
 
+/// A lobe narrower than what the grid sees of it rests on a handful of entries.
+void warn_of_sharp_lobes(FitJob& job, const Table& table) {
+  if (table.coordinates != Coordinates::spherical || table.grid.phi.size() < 2) return;
+  const auto alpha = std::ranges::find(job.fit.parameters, "alpha", &FitParameter::name);
+  if (alpha == job.fit.parameters.end() || !alpha->free) return;
+  // The half vector of directions that lie as close to the mirror direction as the azimuths allow.
+  const auto nearest =
+      std::ranges::min_element(table.grid.phi.values, {}, [](double phi) { return std::abs(180.0 - phi); });
+  const double finest = std::tan(
+      radians(0.5 * std::max(0.5 * (table.grid.phi.values[1] - table.grid.phi.values[0]), std::abs(180.0 - *nearest))));
+  if (alpha->estimate.value >= finest) return;
+  job.fit.solution.remarks.push_back(fmt::format(
+      "alpha is finer than the grid, which sees half vectors from {:.2g} degrees on: hold it by --bound alpha={:.2g},1 "
+      "if a highlight that narrow is not wanted",
+      degrees(std::atan(finest)), finest));
+}
+
 }  // namespace
 
 std::string FitSource::name() const {
@@ -151,6 +168,7 @@ FitJob run_fit(const FitSettings& settings, const FitSource& source, const Conte
   } else {
     job.fit = fit(*settings.model, values, table, options, monitor);
   }
+  warn_of_sharp_lobes(job, table);
   job.document = job.fit.json(context.command, sha256_of_file(source.path));
   job.document["provenance"]["table"] = source.path;
   if (!source.material.empty()) job.document["provenance"]["material"] = source.material;
