@@ -149,11 +149,10 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
     Json parameters = table.parameters;
     const std::vector<double> coordinates = table.parameter_values(row);
     for (std::size_t i = 0; i < coordinates.size(); ++i) parameters[table.parameter_axes[i].name] = coordinates[i];
-    const bool sphere = table.coordinates == Coordinates::spherical &&
-                        (table.grid.theta_i.values.back() >= 90.0 || table.grid.theta_o.values.back() >= 90.0);
-    Source source{name, table.channels, sphere,
+    Source source{name, table.channels, table.reaches_below(),
                   [file, row](const Direction& wi, const Direction& wo) { return file->evaluate(wi, wo, row); },
                   parameters};
+    source.isotropic = is_isotropic(table);
     if (file->rgl) source.albedo_of_light = [file](double theta) { return file->rgl->albedo_of_light(theta); };
     return source;
   }
@@ -167,7 +166,8 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
           [&model, values](const Direction& wi, const Direction& wo) { return model.evaluate(values.flat(), wi, wo); },
           parameters_json(values),
           nullptr,
-          hair};
+          hair,
+          model.info->isotropic};
 }
 
 ModelChoice find_model_or_fit(const std::string& name, const std::vector<std::string>& settings) {

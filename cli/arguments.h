@@ -38,6 +38,8 @@ void add_references(CLI::App& app, Context& context);
 void add_reference(CLI::App& app, Context& context);
 void add_render(CLI::App& app, Context& context);
 void add_table(CLI::App& app, Context& context);
+void add_table_compare(CLI::App& tables, Context& context);
+void add_sphere(CLI::App& app, Context& context);
 void add_fit(CLI::App& app, Context& context);
 void add_refit(CLI::App& app, Context& context);
 void add_check(CLI::App& app, Context& context);
@@ -74,6 +76,7 @@ struct Source {
   Json parameters;
   std::shared_ptr<const Integrator> integrator = nullptr;  // of a reference
   bool fibre = false;                                      // z is its axis
+  bool isotropic = false;                                  // known to be
   /// Directional albedo with the light at `theta` radians, of files that have their own quadrature.
   std::function<Albedo(double theta)> albedo_of_light = nullptr;
 };

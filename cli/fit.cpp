@@ -5,6 +5,7 @@
 
 #include "cli/fit_batch.h"
 #include "cli/fit_text.h"
+#include "cli/metrics_text.h"
 #include "reference/formats/neural_brdf.h"
 #include "reference/output_file.h"
 #include "report/material_figure.h"
@@ -56,7 +57,7 @@ void run_one(const FitArguments& a, const FitSource& source, const Context& cont
   if (context.json) {
     std::cout << job.document.dump(2) << "\n";
   } else {
-    fmt::print("{}{}", fit_text(job.fit), tiers_text(job.tiers));
+    fmt::print("{}{}\n{}", fit_text(job.fit), tiers_text(job.tiers), metrics_text(job.report));
   }
   if (!job.fit.solution.converged) {
     throw Error(ExitCode::not_converged, "the fit did not converge: " + job.fit.solution.termination, a.model,

@@ -174,8 +174,11 @@ FitJob run_fit(const FitSettings& settings, const FitSource& source, const Conte
   if (!source.material.empty()) job.document["provenance"]["material"] = source.material;
   job.document["provenance"]["grid"] = job.grid;
   if (!job.tiers.empty()) job.document["tiers"] = tiers_json(job.tiers);
+  const TableModel on_table(*settings.model, job.fit.values(), table, job.fit.mappings);
+  const Table fitted = on_table.render();
+  job.report = metrics_report(model_pair(file, on_table, fitted.values), {.sphere_size = settings.sphere});
+  job.document["report"] = job.report.json(table);
   if (settings.figure) {
-    const auto fitted = TableModel(*settings.model, job.fit.values(), table, job.fit.mappings).render();
     const auto rms = std::ranges::find(job.fit.metrics, settings.metric, &FitMetric::name);
     job.figure = material_figure(table, fitted.values, source.name() + " and " + job.fit.model,
                                  fmt::format("points: {}; lines: fit, rms {} {:.4g}", dense ? "measured" : "table",

@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "fit/tiers.h"
+#include "report/metrics_report.h"
 
 namespace lobefit {
 
@@ -19,6 +20,7 @@ struct FitSettings {
   std::optional<std::size_t> directions;
   double holdout = 0.0, prior = 0.05;
   int lobes = 2;
+  int sphere = 64;  // pixels across the spheres of the metrics report
   bool staged = false, not_staged = false, compare_tiers = false, figure = false;
 };
 
@@ -34,6 +36,7 @@ struct FitJob {
   Fit fit;
   std::vector<TierFit> tiers;  // empty unless they were compared
   std::string grid;            // "native" or a grid's name
+  MetricsReport report;
   std::string figure;          // a gnuplot program, if the settings ask for one
   Json document;
 };

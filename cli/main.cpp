@@ -98,6 +98,7 @@ int run(int argc, char** argv) {
   add_check(app, context);
   add_export(app, context);
   add_plot(app, context);
+  add_sphere(app, context);
   add_study(app, context);
   for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) {
     verb->fallthrough();

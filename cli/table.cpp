@@ -8,7 +8,6 @@
 #include "cli/slice.h"
 #include "reference/formats/brdf_file.h"
 #include "reference/merge.h"
-#include "reference/metric.h"
 #include "reference/output_file.h"
 #include "report/image.h"
 
@@ -86,94 +85,6 @@ void add_slice(CLI::App& tables, Context& context) {
                   "table slice", "hold the others with --at AXIS=VALUE");
     }
     write_false_colour(slice.cosine_picture(), slice.axes[1].size(), slice.axes[0].size(), a->output, context.force);
-  });
-}
-
-/// A file's values at a table's entries, whatever its own grid; where it has none the table is masked.
-std::vector<float> values_at_entries(const BrdfFile& file, Table& table) {
-  std::vector<float> values(table.values.size());
-  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
-    if (!table.valid[entry]) continue;
-    try {
-      const Rgb f = file.evaluate(table.wi(entry), table.wo(entry));
-      const std::array<double, 3> components{f.x, f.y, f.z};
-      for (std::size_t c = 0; c < static_cast<std::size_t>(table.channels); ++c) {
-        values[c * table.entries() + entry] = static_cast<float>(components[c]);
-      }
-    } catch (const Error&) {
-      table.valid[entry] = 0;
-    }
-  }
-  return values;
-}
-
-void add_compare(CLI::App& tables, Context& context) {
-  CLI::App* verb = tables.add_subcommand("compare",
-                                         "How far a second table, a model or a fit is from a table, in every metric\n"
-                                         "  lobefit table compare truth.exr other.exr --tolerance 1e-4\n"
-                                         "  lobefit table compare truth.exr chan_2024 --set multiple_scattering=0");
-  struct Arguments {
-    std::string first, second, weights = "uniform", metric = "cosine";
-    std::vector<std::string> settings, mappings;
-    double tolerance = 0.0;
-  };
-  const auto a = std::make_shared<Arguments>();
-  verb->add_option("A", a->first, "Table file")->required();
-  verb->add_option("B", a->second, "Table file on the same grid, measured file on any, model, or fit (JSON)")
-      ->required();
-  add_repeatable(*verb, "--set", a->settings, "NAME=VALUE of the model (repeatable)");
-  add_repeatable(*verb, "--map", a->mappings, "NAME=SCALE*AXIS^POWER of the model (repeatable)");
-  verb->add_option(
-          "--weights", a->weights,
-          "uniform, or a product of sin_theta_i, sin_theta_o, cos_theta_i, cos_theta_o, quadrature, inverse_variance")
-      ->capture_default_str();
-  verb->add_option("--metric", a->metric, "Metric that --tolerance bounds: cosine, brdf, log, cube_root")
-      ->capture_default_str();
-  auto* tolerance = verb->add_option("--tolerance", a->tolerance, "Exit with 5 if the metric is larger");
-  verb->callback([&context, a, tolerance] {
-    Table table = read_table(a->first);
-    const Quantity bounded = parse_quantity(a->metric);
-    std::vector<float> values;
-    if (is_file(a->second) && !a->second.ends_with(".json")) {
-      const BrdfFile file = read_brdf_file(a->second);
-      const Table& other = file.table;
-      const bool measured = table.coordinates != Coordinates::spherical || other.coordinates != Coordinates::spherical;
-      if (measured && !other.same_grid(table) && other.channels == table.channels && other.parameter_rows() == 1) {
-        values = values_at_entries(file, table);
-      } else if (!other.same_grid(table) || other.channels != table.channels) {
-        throw Error(ExitCode::invalid_input, "the tables have different axes", a->second,
-                    "render both over the same grid; `lobefit table info` shows it");
-      } else {
-        values = other.values;
-        for (std::size_t entry = 0; measured && entry < table.entries(); ++entry)
-          table.valid[entry] &= other.valid[entry];
-      }
-    } else {
-      const ModelChoice choice = choose_for_table(a->second, a->settings, a->mappings, table);
-      values = TableModel(*choice.model, choice.values, table, choice.mappings).render().values;
-    }
-    Json metrics = Json::object();
-    double found = 0.0;
-    for (std::size_t q = 0; q < quantity_names.size(); ++q) {
-      const auto quantity = static_cast<Quantity>(q);
-      const double rms =
-          rms_difference(table, values, quantity, entry_weights(table, parse_weights(a->weights), quantity));
-      metrics[std::string(quantity_names[q])] = rms;
-      if (quantity == bounded) found = rms;
-    }
-    const bool passed = tolerance->count() == 0 || found <= a->tolerance;
-    if (context.json) {
-      std::cout
-          << Json{{"a", a->first}, {"b", a->second}, {"weights", a->weights}, {"metrics", metrics}, {"passed", passed}}
-                 .dump(2)
-          << "\n";
-    } else {
-      for (const auto& [name, value] : metrics.items()) fmt::print("  rms {:<10} {:.6g}\n", name, value.get<double>());
-    }
-    if (!passed) {
-      throw Error(ExitCode::check_failed, fmt::format("rms {} {:.6g} exceeds {:g}", a->metric, found, a->tolerance),
-                  a->second, "raise --tolerance only if the difference is meant");
-    }
   });
 }
 
@@ -308,7 +219,7 @@ void add_table(CLI::App& app, Context& context) {
   verb->require_subcommand(1);
   add_info(*verb, context);
   add_slice(*verb, context);
-  add_compare(*verb, context);
+  add_table_compare(*verb, context);
   add_convert(*verb, context);
   add_merge(*verb, context);
   add_recolor(*verb, context);

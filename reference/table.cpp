@@ -245,6 +245,11 @@ std::vector<double> Table::quadrature_weights() const {
   return weights;
 }
 
+bool Table::reaches_below() const {
+  return coordinates == Coordinates::spherical &&
+         (grid.theta_i.values.back() >= 90.0 || grid.theta_o.values.back() >= 90.0);
+}
+
 bool Table::same_grid(const Table& other) const {
   return coordinates == other.coordinates && describe()["axes"] == other.describe()["axes"] &&
          directions == other.directions;

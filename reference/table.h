@@ -161,6 +161,8 @@ struct Table {
   /// masked on a Rusinkiewicz grid; the nearest entry of a list. Throws Error(usage) outside the grid's angles, and
   /// where neighbours are masked.
   Rgb interpolate(std::size_t row, const Direction& light, const Direction& view) const;
+  /// Whether the angles reach the horizon or pass it: light that passes, or a fibre.
+  bool reaches_below() const;
   /// Whether both tables have the same entries at the same places.
   bool same_grid(const Table& other) const;
   /// The table of one parameter row alone, without parameter axes.

@@ -5,11 +5,17 @@
 #include <filesystem>
 #include <span>
 
+#include "report/sphere.h"
+
 namespace lobefit {
 
 /// A height × width picture in false colours (viridis from the least to the largest value, NaN black), each value a
 /// square of pixels, as PNG. Throws Error(missing_part) if the module can't be opened, Error(failure) if writing fails.
 void write_false_colour(std::span<const float> values, std::size_t width, std::size_t height,
                         const std::filesystem::path& path, bool overwrite);
+
+/// RGBA, alpha the cover and colours multiplied by it: .exr as linear 32-bit floats, .png as 8-bit sRGB. Radiance times
+/// 2^exposure; what then exceeds 1 is white in a PNG. Errors as above; Error(usage) for another extension.
+void write_picture(const SphereImage& image, double exposure, const std::filesystem::path& path, bool overwrite);
 
 }  // namespace lobefit

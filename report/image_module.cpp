@@ -10,8 +10,27 @@
 
 namespace lobefit {
 
-extern "C" bool lobefit_write_false_colour(std::span<const float> values, std::size_t width, std::size_t height,
-                                           const std::filesystem::path& path, std::string& failure);
+namespace {
+
+/// The map is linear, PNG is sRGB.
+float encode(float v) { return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1.0f / 2.4f) - 0.055f; }
+
+bool write(OIIO::ImageBuf& picture, OIIO::TypeDesc type, const std::filesystem::path& path, std::string& failure) {
+  // Its own format attributes would carry the date; a picture of the same values has the same bytes.
+  picture.specmod().erase_attribute("DateTime");
+  if (picture.has_error() || !picture.write(path.string(), type)) {
+    failure = picture.geterror();
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+extern "C" {
+WriteFalseColour lobefit_write_false_colour;
+WritePicture lobefit_write_picture;
+}
 
 bool lobefit_write_false_colour(std::span<const float> values, std::size_t width, std::size_t height,
                                 const std::filesystem::path& path, std::string& failure) {
@@ -35,8 +54,6 @@ bool lobefit_write_false_colour(std::span<const float> values, std::size_t width
   const OIIO::ImageSpec spec(w, h, 1, OIIO::TypeDesc::FLOAT);
   const OIIO::ImageBuf plane(spec, grey.data()), covered(spec, mask.data());
   OIIO::ImageBuf colours = OIIO::ImageBufAlgo::color_map(plane, 0, "viridis");
-  // The map is linear, PNG is sRGB.
-  const auto encode = [](float v) { return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1.0f / 2.4f) - 0.055f; };
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
       std::array<float, 3> pixel{};
@@ -45,13 +62,25 @@ bool lobefit_write_false_colour(std::span<const float> values, std::size_t width
       colours.setpixel(x, y, pixel.data());
     }
   }
-  // Its own format attributes would carry the date; a picture of the same table has the same bytes.
-  colours.specmod().erase_attribute("DateTime");
-  if (colours.has_error() || !colours.write(path.string(), OIIO::TypeDesc::UINT8)) {
-    failure = colours.geterror();
-    return false;
+  return write(colours, OIIO::TypeDesc::UINT8, path, failure);
+}
+
+bool lobefit_write_picture(std::span<const float> rgba, std::size_t size, bool display,
+                           const std::filesystem::path& path, std::string& failure) {
+  std::vector<float> values(rgba.begin(), rgba.end());
+  if (display) {
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      // PNG's alpha is not multiplied in; colours are those of the sphere also at its edge.
+      if (k % 4 == 3) continue;
+      const float alpha = values[k / 4 * 4 + 3];
+      values[k] = alpha > 0.0f ? encode(std::clamp(values[k] / alpha, 0.0f, 1.0f)) : 0.0f;
+    }
   }
-  return true;
+  const auto pixels = static_cast<int>(size);
+  OIIO::ImageSpec spec(pixels, pixels, 4, OIIO::TypeDesc::FLOAT);
+  if (display) spec.attribute("oiio:UnassociatedAlpha", 1);
+  OIIO::ImageBuf picture(spec, values.data());
+  return write(picture, display ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, path, failure);
 }
 
 }  // namespace lobefit

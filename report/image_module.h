@@ -9,9 +9,13 @@ namespace lobefit {
 
 inline constexpr const char* image_module_name = "liblobefit_image.so";
 inline constexpr const char* write_false_colour_symbol = "lobefit_write_false_colour";
+inline constexpr const char* write_picture_symbol = "lobefit_write_picture";
 
 /// False with `failure` filled in if the picture could not be written.
 using WriteFalseColour = bool(std::span<const float> values, std::size_t width, std::size_t height,
                               const std::filesystem::path& path, std::string& failure);
+/// Linear RGBA, size × size; `display` encodes as 8-bit sRGB.
+using WritePicture = bool(std::span<const float> rgba, std::size_t size, bool display,
+                          const std::filesystem::path& path, std::string& failure);
 
 }  // namespace lobefit

@@ -373,6 +373,57 @@ TEST_F(CommandLine, CompareExitsWithFiveBeyondTheTolerance) {
   expect_refused("table compare a.exr c.exr", 3, {"axes"});
 }
 
+TEST_F(CommandLine, CompareReportsEveryMetric) {
+  ASSERT_EQ(run("render lambert --grid default -o a.exr").code, 0);
+  const Json report = json("table compare a.exr lambert --set albedo=0.75 --sphere 24")["report"];
+  EXPECT_NEAR(report["rms"]["brdf"]["solid_angle"], 0.25, 1e-6);
+  EXPECT_NEAR(report["smape"]["uniform"], 0.25 / 1.75, 1e-6);
+  EXPECT_NEAR(report["bihemispherical"]["absolute"], 0.25 * 3.14159265, 1e-5);
+  EXPECT_NEAR(report["albedo"]["relative"]["worst"], 0.25, 1e-6);
+  EXPECT_EQ(report["albedo"]["angles"].size(), 18u);
+  EXPECT_EQ(report["sphere"]["size"], 24);
+  for (const char* lighting : {"directional", "three_lights", "environment"}) {
+    EXPECT_GT(report["sphere"][lighting]["delta_e_itp_mean"], 1.0) << lighting;
+    EXPECT_GE(report["sphere"][lighting]["delta_e_itp_p95"], report["sphere"][lighting]["delta_e_itp_mean"]);
+    EXPECT_GT(report["sphere"][lighting]["flip_mean"], 0.01) << lighting;
+  }
+  EXPECT_EQ(report["not_formed"], Json::array());
+  EXPECT_TRUE(json("table compare a.exr lambert --sphere 0")["report"]["sphere"].is_null());
+  // A fit stands where a model does; weights of one's own are beside the report.
+  ASSERT_EQ(run("fit lambert a.exr -o fit.json").code, 0);
+  const Json fitted = json("table compare a.exr fit.json --weights cos_theta_o,quadrature --tolerance 1e-6");
+  EXPECT_EQ(fitted["passed"], true);
+  EXPECT_EQ(fitted["weights"], "cos_theta_o,quadrature");
+  EXPECT_LT(fitted["report"]["sphere"]["environment"]["delta_e_itp_p95"], 1e-3);
+  const Outcome text = run("table compare a.exr lambert --set albedo=0.75");
+  for (const char* line : {"rms cube_root", "smape", "bihemispherical", "albedo", "environment", "solid angle"}) {
+    EXPECT_NE(text.out.find(line), std::string::npos) << line;
+  }
+  std::ofstream(folder_ / "plane.json") << R"({"theta_i":[0,30,60],"theta_o":[0,30,60],"phi":[0]})";
+  ASSERT_EQ(run("render lambert --grid plane.json -o plane.exr").code, 0);
+  EXPECT_NE(run("table compare plane.exr lambert").out.find("no albedo: "), std::string::npos);
+  expect_refused("table compare a.exr lambert --sphere -1", 2, {"--sphere"});
+}
+
+TEST_F(CommandLine, SpheresAreWrittenWholeAndTheSameTwice) {
+  ASSERT_EQ(run("sphere lambert --light 0,0 --size 32 -o a.png").code, 0);
+  ASSERT_EQ(run("sphere lambert --light 0,0 --size 32 -o b.png --threads 1").code, 0);
+  EXPECT_TRUE(content(folder_ / "a.png").starts_with("\x89PNG"));
+  EXPECT_EQ(content(folder_ / "a.png"), content(folder_ / "b.png"));
+  ASSERT_EQ(run("sphere callisto --set alpha=0.2 --exposure 1 --size 32 -o a.exr").code, 0);
+  EXPECT_TRUE(content(folder_ / "a.exr").starts_with("\x76\x2f\x31\x01"));
+  ASSERT_EQ(run("render lambert --grid small -o t.exr").code, 0);
+  const Json sphere = json("sphere t.exr --lighting three_lights --size 16 -o t.png");
+  EXPECT_EQ(sphere["lighting"], "three_lights");
+  expect_refused("sphere lambert --light 0,0 -o a.png", 2, {"a.png", "--force"});
+  expect_refused("sphere lambert -o a.gif", 2, {".gif", ".png"});
+  expect_refused("sphere lambert --light 40 -o c.png", 2, {"--light", "THETA,PHI"});
+  expect_refused("sphere lambert --lighting candle -o c.png", 2, {"candle", "environment"});
+  expect_refused("sphere hair_unreal -o c.png", 2, {"hair_unreal", "opaque"});
+  expect_refused("sphere microfacet_diffuse --set bounces=all --set alpha_x=0.2 --set alpha_y=0.5 -o c.png", 2,
+                 {"microfacet_diffuse", "table"});
+}
+
 TEST_F(CommandLine, ModelsDescribeThemselves) {
   const Json all = json("models")["models"];
   EXPECT_GE(all.size(), 8u);
@@ -390,7 +441,7 @@ TEST_F(CommandLine, ModelsDescribeThemselves) {
     }
   }
   for (const char* verb : {"models", "eval", "albedo", "references", "reference", "render", "table", "fit", "refit",
-                           "check", "export", "plot"}) {
+                           "check", "export", "plot", "sphere"}) {
     const Outcome help = run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find(verb), std::string::npos);

@@ -119,6 +119,17 @@ Table BrdfFile::resampled(const Grid& grid, bool nearest_bin) const {
   return result;
 }
 
+RowBrdf row_brdf(const BrdfFile& file) {
+  if (!file.rgl && file.table.coordinates == Coordinates::list) return nullptr;
+  return [&file](std::size_t row, const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
+    try {
+      return file.evaluate(wi, wo, row);
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  };
+}
+
 FileFormat format_of_extension(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   if (extension == ".exr") return FileFormat::exr;

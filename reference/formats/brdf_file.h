@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#include "reference/brdf_pair.h"
 #include "reference/formats/rgl.h"
 #include "reference/formats/utia.h"
 #include "reference/table.h"
@@ -44,6 +45,9 @@ struct BrdfFile {
   /// One parameter row alone.
   BrdfFile row_slice(std::size_t row) const { return {format, table.row_slice(row), rgl}; }
 };
+
+/// A file at any pair of directions, to which it refers; null where it knows its own entries alone.
+RowBrdf row_brdf(const BrdfFile& file);
 
 /// Throws Error(invalid_input) with the byte or line that is wrong, Error(usage) for a material that the file lacks.
 BrdfFile read_brdf_file(const std::filesystem::path& path, const ReadOptions& options = {});
