@@ -141,6 +141,16 @@ void warn_of_sharp_lobes(FitJob& job, const Table& table) {
       degrees(std::atan(finest)), finest));
 }
 
+/// Pictures of both, one parameter row; none where one of them has no values between its entries.
+std::vector<SphereImage> sphere_pair(const BrdfPair& pair) {
+  if (!pair.truth || !pair.other || pair.table->parameter_rows() > 1 || no_hemisphere(*pair.table)) return {};
+  const auto first_row = [](const RowBrdf& brdf) -> SphereBrdf {
+    return [&brdf](const Direction& wi, const Direction& wo) { return brdf(0, wi, wo); };
+  };
+  const std::array<SphereBrdf, 2> brdfs{first_row(pair.truth), first_row(pair.other)};
+  return render_spheres(brdfs, Lighting::three_lights(), {.size = 160, .antialiasing = 2, .isotropic = pair.isotropic});
+}
+
 }  // namespace
 
 std::string FitSource::name() const {
@@ -180,7 +190,8 @@ FitJob run_fit(const FitSettings& settings, const FitSource& source, const Conte
   job.document["report"] = job.report.json(table);
   if (settings.figure) {
     const auto rms = std::ranges::find(job.fit.metrics, settings.metric, &FitMetric::name);
-    job.figure = material_figure(table, fitted.values, source.name() + " and " + job.fit.model,
+    job.figure = material_figure(table, fitted.values, sphere_pair(model_pair(file, on_table, fitted.values)),
+                                 source.name() + " and " + job.fit.model,
                                  fmt::format("points: {}; lines: fit, rms {} {:.4g}", dense ? "measured" : "table",
                                              settings.metric, rms->value));
   }

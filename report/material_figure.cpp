@@ -32,12 +32,72 @@ std::vector<std::pair<double, std::size_t>> plane_of_incidence(const Table& tabl
   return line;
 }
 
+/// 8-bit sRGB (IEC 61966-2-1) of a linear radiance.
+int display(double radiance) {
+  const double x = std::clamp(radiance, 0.0, 1.0);
+  const double encoded = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
+  return static_cast<int>(std::lround(255.0 * encoded));
+}
+
+/// Datablocks of the spheres on white, at the exposure that shows a twentieth of the first one's pixels at full white.
+std::string sphere_blocks(std::span<const SphereImage> spheres) {
+  if (spheres.empty()) return "";
+  std::vector<float> levels;
+  for (std::size_t pixel = 0; pixel < spheres[0].pixels(); ++pixel) {
+    if (spheres[0].cover[pixel] > 0.0f) {
+      const float* rgb = spheres[0].rgb.data() + 3 * pixel;
+      levels.push_back(std::max({rgb[0], rgb[1], rgb[2]}));
+    }
+  }
+  double scale = 1.0;
+  if (!levels.empty()) {
+    const auto bright = levels.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(levels.size() - 1));
+    std::ranges::nth_element(levels, bright);
+    if (*bright > 0.0f) scale = 1.0 / static_cast<double>(*bright);
+  }
+  std::string text;
+  for (std::size_t k = 0; k < spheres.size(); ++k) {
+    text += fmt::format("$sphere_{} << EOD\n", k);
+    const auto size = static_cast<std::size_t>(spheres[k].size);
+    for (std::size_t pixel = 0; pixel < spheres[k].pixels(); ++pixel) {
+      text += fmt::format("{} {}", pixel % size, size - 1 - pixel / size);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double cover = spheres[k].cover[pixel];
+        const int own = display(scale * spheres[k].rgb[3 * pixel + c]);
+        text += fmt::format(" {}", static_cast<int>(std::lround(cover * own + (1.0 - cover) * 255.0)));
+      }
+      text += "\n";
+    }
+    text += "EOD\n";
+  }
+  return text;
+}
+
+/// The spheres one above the other, in the place of the panel after the last.
+std::string sphere_panels(std::span<const SphereImage> spheres, std::size_t column) {
+  constexpr std::array titles{"measured", "fitted"};
+  std::string text =
+      "unset logscale; unset border; unset xtics; unset ytics; unset grid; unset label 3; unset label 4\n";
+  for (std::size_t k = 0; k < spheres.size(); ++k) {
+    text += fmt::format(
+        "set lmargin at screen across(left + {0} * (panel_width + gap_across))\n"
+        "set rmargin at screen across(left + {0} * (panel_width + gap_across) + panel_width)\n"
+        "set tmargin at screen down(top + {1} * panel_height / 2 + 4)\n"
+        "set bmargin at screen down(top + {2} * panel_height / 2 - 22)\n"
+        "set title '{3}' offset 0, -0.6 font ''.plain({4})\n"
+        "set size ratio -1; set xrange [0:{5}]; set yrange [0:{5}]\n"
+        "plot $sphere_{1} using 1:2:3:4:5 with rgbimage\n",
+        column, k, k + 1, titles[k], label_size, spheres[k].size);
+  }
+  return text;
+}
+
 }  // namespace
 
-FigureSize material_figure_size() { return {1200, 520}; }
+FigureSize material_figure_size() { return {1400, 520}; }
 
-std::string material_figure(const Table& measured, std::span<const float> fitted, const std::string& title,
-                            const std::string& subtitle) {
+std::string material_figure(const Table& measured, std::span<const float> fitted, std::span<const SphereImage> spheres,
+                            const std::string& title, const std::string& subtitle) {
   if (measured.coordinates != Coordinates::spherical) {
     throw Error(ExitCode::usage, "the material lies on no grid of angles", "figure", "fit it with --grid measured");
   }
@@ -68,7 +128,7 @@ std::string material_figure(const Table& measured, std::span<const float> fitted
   text +=
       "left = 74.0; right = figure_width - 20.0; top = 84.0; bottom = figure_height - 50.0\n"
       "gap_across = 22.0; gap_down = 40.0\n";
-  text += panel_layout(view_angles.size(), 1) +
+  text += sphere_blocks(spheres) + panel_layout(view_angles.size() + (spheres.empty() ? 0 : 1), 1) +
           shared_axis_labels("θ_i in degrees: mirror side at the left, retro side at the right", "f cos θ_i");
   text +=
       "set grid linetype 1 linewidth 0.5 linecolor rgb '#e4e4e4' dashtype solid\n"
@@ -88,6 +148,7 @@ std::string material_figure(const Table& measured, std::span<const float> fitted
     }
     text += "\n";
   }
+  if (!spheres.empty()) text += sphere_panels(spheres, view_angles.size());
   return text + "unset multiplot\n";
 }
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -16,6 +17,7 @@
 
 #include "models/error.h"
 #include "reference/output_file.h"
+#include "report/material_figure.h"
 
 namespace lobefit {
 
@@ -199,6 +201,47 @@ TEST(ResidualFigure, NeedsSeveralViewsAndAModel) {
 }
 
 /// Runs in a folder of its own, which a failed figure must leave empty: no picture, no partial one.
+TEST(MaterialFigure, HoldsTheSlicesOfBothSides) {
+  Table table;
+  table.grid = {axis("theta_i", {10, 30, 60}), axis("theta_o", {5, 30, 55, 75}), axis("phi", {0, 90, 180})};
+  table.channels = 3;
+  table.allocate();
+  for (std::size_t i = 0; i < table.values.size(); ++i) table.values[i] = 0.1f + 0.001f * static_cast<float>(i);
+  table.valid[entry_of(table, 0, 2, 1, 2)] = 0;
+  std::vector<float> fitted = table.values;
+  for (float& value : fitted) value *= 2.0f;
+  table.values[table.entries() + entry_of(table, 0, 1, 0, 0)] = -0.5f;
+  const std::string program = material_figure(table, fitted, {}, "title", "subtitle");
+  // View 55°, blue: the mirror side first, without its masked entry.
+  const auto line = block(program, "slice_2_2");
+  ASSERT_EQ(line.size(), 5u);
+  const std::array<double, 5> angles{-60, -10, 10, 30, 60};
+  for (std::size_t k = 0; k < 5; ++k) {
+    const std::size_t theta_i = k == 0 || k == 4 ? 2 : k == 3 ? 1 : 0;
+    const std::size_t entry = 2 * table.entries() + entry_of(table, 0, 2, theta_i, k < 2 ? 2 : 0);
+    const double cosine = std::cos(std::abs(angles[k]) * std::numbers::pi / 180.0);
+    EXPECT_EQ(line[k][0], angles[k]);
+    EXPECT_NEAR(line[k][1], cosine * table.values[entry], 1e-6);
+    EXPECT_NEAR(line[k][2], 2.0 * line[k][1], 2e-6);
+  }
+  // A negative measurement has no logarithm: a gap, not a value.
+  EXPECT_NE(program.find("10 NaN "), std::string::npos);
+  EXPECT_EQ(program.find("rgbimage"), std::string::npos);
+
+  SphereImage sphere{.size = 2, .rgb = std::vector<float>(12, 0.25f), .cover = {0, 1, 1, 1}};
+  const auto with_spheres = material_figure(table, fitted, std::vector{sphere, sphere}, "title", "subtitle");
+  // The first pixel is outside: white; the others are as bright as the brightest.
+  const auto pixels = block(with_spheres, "sphere_0");
+  ASSERT_EQ(pixels.size(), 4u);
+  for (const auto& pixel : pixels) EXPECT_EQ(pixel[2], 255.0);
+  EXPECT_EQ(pixels[0][1], 1.0);  // the top line
+  sphere.rgb[3] = 0.125f;        // half of it, by the formula of IEC 61966-2-1: 1.055 · .5^(1/2.4) - .055 = .7354
+  EXPECT_EQ(block(material_figure(table, fitted, std::vector{sphere, sphere}, "t", "s"), "sphere_1")[1][2], 188.0);
+
+  table.coordinates = Coordinates::list;
+  EXPECT_THROW(material_figure(table, fitted, {}, "title", "subtitle"), Error);
+}
+
 class WriteFigure : public ::testing::Test {
  protected:
   void SetUp() override {
