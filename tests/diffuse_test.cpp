@@ -579,5 +579,42 @@ TEST(LambertSphere, MeanAlbedo) {
   EXPECT_NEAR(Material("lambert_sphere", {{"albedo", 1.0}}).mean_albedo(), 1.0818, 1e-4);
 }
 
+// ---- sampling ---------------------------------------------------------------------------------------------------
+
+TEST(DiffuseSampling, WeightsAreBounded) {
+  // |f| cos θ/pdf over the albedo, at views down to .06° above the horizon. By the cosine alone models that rise as
+  // 1/cos θ pass 200 there.
+  for (const std::string_view name :
+       {"lambert", "burley", "oren_nayar", "eon", "chan_2018", "chan_2024", "hammon", "proxima", "proxima_unclamped",
+        "frostbite_burley", "oren_nayar_qualitative", "fujii_oren_nayar", "gotanda_2012", "gotanda_2014",
+        "gotanda_2014_unreal", "lambert_sphere", "disney_subsurface"}) {
+    const Model& model = find_model(name);
+    UniformNumbers uniform(61);
+    double largest = 0.0, variance = 0.0;
+    for (const bool rough : {false, true}) {
+      ParameterValues values = model.defaults();
+      for (const char* parameter : {"roughness", "alpha", "sigma"}) {
+        if (rough && values.has(parameter)) values.set(parameter, values.info(parameter).upper);
+      }
+      for (const double cosine_o : {1.0, 0.5, 0.1, 0.001}) {
+        constexpr int count = 20'000;
+        const Direction wo = direction(std::acos(cosine_o), 0.7);
+        double sum = 0.0, squares = 0.0, peak = 0.0;
+        for (int i = 0; i < count; ++i) {
+          const double u0 = (i + uniform()) / count, u1 = uniform();
+          const Direction wi = model.sample(values.flat(), wo, {u0, u1});
+          const double weight = model.evaluate(values.flat(), wi, wo).x * wi.z / model.pdf(values.flat(), wi, wo);
+          sum += weight, squares += weight * weight, peak = std::max(peak, std::abs(weight));
+        }
+        largest = std::max(largest, peak * count / sum);
+        variance = std::max(variance, squares * count / (sum * sum) - 1.0);
+      }
+    }
+    EXPECT_LT(largest, 20.0) << name;
+    EXPECT_LT(variance, 1.0) << name;
+    std::printf("  %-24s largest weight %5.2f, relative variance %.3f\n", name.data(), largest, variance);
+  }
+}
+
 }  // namespace
 }  // namespace lobefit

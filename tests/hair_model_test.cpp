@@ -10,10 +10,12 @@
 
 #include "models/hair/fibre.h"
 #include "models/hair/longitudinal.h"
+#include "models/hair/sampling.h"
 #include "models/registry.h"
 #include "reference/hair/hair.h"
 #include "tests/directions.h"
 #include "tests/gauss_legendre.h"
+#include "tests/sphere_sampling.h"
 
 namespace lobefit {
 namespace {
@@ -398,6 +400,142 @@ TEST(HairUnreal, AgainstTheExactReference) {
       const Settings settings{{"roughness", roughness}, {"base_color", color}};
       std::printf("  base_color %s, roughness %s: relative rms %.4f\n", color, roughness,
                   relative_rms(HairModel("hair_unreal", settings), settings, 4000));
+    }
+  }
+}
+
+// ---- sampling ---------------------------------------------------------------------------------------------------
+
+/// A model, and its parameters with some set.
+struct SampledHair {
+  SampledHair(std::string_view name, const Settings& settings) : model(find_model(name)), values(model.defaults()) {
+    for (const auto& [parameter, text] : settings) values.set_text(parameter, text);
+  }
+  const Model& model;
+  ParameterValues values;
+};
+
+/// Lobes wide enough for cells and quadrature, in every form that the sampling tells apart.
+std::vector<SampledHair> sampled_hair() {
+  const Settings tilted{{"roughness", "0.6"}, {"shift", "0.1"}, {"tilt_r", "8"}, {"tilt_tt", "-8"}, {"tilt_trt", "8"}};
+  std::vector<SampledHair> list;
+  for (const char* name : {"hair_unreal", "hair_reference"}) {
+    list.emplace_back(name, Settings{{"roughness", "0.6"}});
+    list.emplace_back(name, Settings{{"roughness", "1"}, {"base_color", "0.3,0.2,0.1"}});
+    list.emplace_back(name, tilted);
+  }
+  for (const char* form : {"constant_width", "printed"}) {
+    list.emplace_back("hair_unreal", Settings{{"roughness", "0.6"}, {"r_form", form}, {"specular", "1"}});
+  }
+  for (const char* form : {"chiang_as_coded", "chiang"}) {
+    list.emplace_back("hair_unreal", Settings{{"roughness", "0.6"}, {"absorption_form", form}, {"scatter", "0.5"}});
+  }
+  return list;
+}
+
+TEST(HairSampling, WrappedCauchyEnvelopsExpOfCosine) {
+  // Best and Fisher's √(2π/e); ∫ exp(κ cos φ) dφ = 2π I0(κ).
+  for (const double kappa : {0.0, 1e-6, 0.5, 3.65, 17.0, 30.0}) {
+    const WrappedCauchy cauchy(kappa);
+    double largest = 0.0;
+    for (int k = 0; k <= 2000; ++k) {
+      const double phi = pi * k / 2000.0;
+      const double truth = std::exp(kappa * (std::cos(phi) - 1.0)) / (2.0 * pi * bessel_i0_scaled(kappa));
+      largest = std::max(largest, truth / cauchy.density(phi));
+    }
+    EXPECT_LE(largest, std::sqrt(2.0 * pi / std::exp(1.0)) + 1e-9) << kappa;
+    // The density is that of the samples: their distribution function at φ(u) is u.
+    for (const double u : {0.01, 0.3, 0.5, 0.9}) {
+      double below = 0.0;
+      for (int panel = 0; panel < 64; ++panel) {
+        const double to = cauchy.sample(u) + pi;
+        for (const auto& [x, weight] : gauss_legendre(8, to * panel / 64.0, to * (panel + 1) / 64.0)) {
+          below += weight * cauchy.density(x - pi);
+        }
+      }
+      EXPECT_NEAR(below, u, 1e-6) << kappa;
+    }
+  }
+}
+
+TEST(HairSampling, SamplesFollowTheirDensity) {
+  // Views off the axis, next to its end, and on it.
+  for (const SampledHair& hair : sampled_hair()) {
+    for (const double theta : {0.0, 50.0, -85.0, 90.0}) {
+      const SamplingFit fit = expect_samples_follow_pdf(hair.model, hair.values.flat(), inclined(theta, 20.0));
+      std::printf("%s, %g degrees: chi2 %.0f of %d cells\n", hair.model.info->name.data(), theta, fit.chi2, fit.cells);
+    }
+  }
+}
+
+TEST(HairSampling, SamplesIntegrateToTheAlbedo) {
+  // Against quadrature that knows nothing of the sampling.
+  double worst = 0.0;
+  for (const SampledHair& hair : sampled_hair()) {
+    for (const double theta : {10.0, -60.0, 80.0}) {
+      const double sampled = sampled_albedo(hair.model, hair.values.flat(), inclined(theta, 20.0), 400);
+      const double integral = integrated_albedo(hair.model, hair.values.flat(), inclined(theta, 20.0));
+      worst = std::max(worst, std::abs(sampled - integral) / integral);
+      EXPECT_NEAR(sampled, integral, 4e-3 * integral) << hair.model.info->name << " at " << theta;
+    }
+  }
+  std::printf("samples against quadrature: %.2g\n", worst);
+}
+
+/// Variance of S/pdf over its squared mean, and its largest over its mean.
+struct Weights {
+  double variance, largest;
+};
+Weights weights(const SampledHair& hair, const Direction& wo) {
+  constexpr int count = 20'000;
+  UniformNumbers uniform(5);
+  double sum = 0.0, squares = 0.0, largest = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const double u0 = (i + uniform()) / count, u1 = uniform();
+    const Direction wi = hair.model.sample(hair.values.flat(), wo, {u0, u1});
+    const double weight =
+        hair.model.evaluate(hair.values.flat(), wi, wo).x / hair.model.pdf(hair.values.flat(), wi, wo);
+    sum += weight, squares += weight * weight, largest = std::max(largest, weight);
+  }
+  const double mean = sum / count;
+  return {squares / count / (mean * mean) - 1.0, largest / mean};
+}
+
+TEST(HairSampling, VarianceIsLowAtAnyRoughnessAndView) {
+  // Of the uniform sphere it is 1.5 (roughness 1) to 80,000.
+  Weights worst{};
+  for (const char* roughness : {"0.00392156862745098", "0.03", "0.1", "0.3", "0.6", "1"}) {
+    std::vector<SampledHair> list{{"hair_reference", {{"roughness", roughness}}}};
+    for (const char* form : {"azimuthal_width", "constant_width", "printed"}) {
+      list.emplace_back("hair_unreal", Settings{{"roughness", roughness}, {"r_form", form}});
+    }
+    for (const SampledHair& hair : list) {
+      for (const double sine : {0.0, 0.5, -0.9, 0.99, -0.9999}) {
+        const Weights found = weights(hair, inclined(degrees(std::asin(sine)), 53.0));
+        EXPECT_LT(found.variance, 1.0) << hair.model.info->name << ", roughness " << roughness << ", sine " << sine;
+        worst = {std::max(worst.variance, found.variance), std::max(worst.largest, found.largest)};
+      }
+    }
+  }
+  std::printf("largest relative variance %.3g, largest weight %.3g of the mean\n", worst.variance, worst.largest);
+}
+
+TEST(HairSampling, DensitiesArePositiveOnHostileDirectionsAndParameters) {
+  // Nowhere below the uniform sphere's share, so that weights are bounded wherever S is.
+  for (const char* name : {"hair_unreal", "hair_reference"}) {
+    const Model& model = find_model(name);
+    UniformNumbers uniform(6);
+    for (const std::vector<double>& flat : corner_parameters(model.parameters, 15)) {
+      for (const auto& [wi, wo] : hostile_pairs()) {
+        for (const Direction& light : {wi, Direction{wi.x, wi.y, -wi.z}}) {
+          const double density = model.pdf(flat, light, wo);
+          ASSERT_TRUE(std::isfinite(density));
+          EXPECT_GE(density, 0.99 / 16.0 / (4.0 * pi));
+        }
+        const double u0 = uniform(), u1 = uniform();
+        const Direction sampled = model.sample(flat, wo, {u0, u1});
+        EXPECT_NEAR(dot(sampled, sampled), 1.0, 1e-9);
+      }
     }
   }
 }

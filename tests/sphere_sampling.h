@@ -1,4 +1,5 @@
-// A model's own sampling over the whole sphere of lights: what transmits, and facets that reflect below the horizon.
+// A model's own sampling over the whole sphere of lights: what transmits, fibres, and facets that reflect below the
+// horizon.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,6 +19,27 @@ struct SamplingFit {
   double chi2 = 0.0;
   int cells = 0;
 };
+
+/// ∫ pdf dω over a cell of z and azimuth. In parts, for the density has a kink where facets turn away from wo; in more
+/// of them next to -wo, where half vectors' densities go as 1/|wi + wo|. In the polar angle: those of fibres go as its
+/// inverse sine at the ends of the axis.
+inline double share_of_cell(const Model& model, std::span<const double> flat, const Direction& wo,
+                            std::pair<double, double> z, std::pair<double, double> phi) {
+  const Direction middle = direction(std::acos(0.5 * (z.first + z.second)), 0.5 * (phi.first + phi.second));
+  const bool next_to_pole = !is_hair(model.info->kind) && dot(middle, wo) < -0.9;
+  const int parts = next_to_pole ? 24 : 4;
+  const double top = std::acos(z.second), height = std::acos(z.first) - top, width = phi.second - phi.first;
+  double share = 0.0;
+  for (int part = 0; part < parts * parts; ++part) {
+    const double above = top + height * (part / parts) / parts, left = phi.first + width * (part % parts) / parts;
+    for (const auto& [theta, theta_weight] : gauss_legendre(6, above, above + height / parts)) {
+      for (const auto& [turn, turn_weight] : gauss_legendre(6, left, left + width / parts)) {
+        share += theta_weight * std::sin(theta) * turn_weight * model.pdf(flat, direction(theta, turn), wo);
+      }
+    }
+  }
+  return share;
+}
 
 /// Pearson's χ² of 200,000 samples against pdf(), over 20 bands in z by 16 azimuths, and ∫ pdf. Cells that expect fewer
 /// than 8 samples are left out. Five deviations: a right sampling fails about once in a million runs; the seed is
@@ -40,19 +62,8 @@ inline SamplingFit expect_samples_follow_pdf(const Model& model, std::span<const
   int cells = 0;
   for (int band = 0; band < bands; ++band) {
     for (int turn = 0; turn < turns; ++turn) {
-      // In parts: the density has a kink where facets turn away from wo.
-      constexpr int parts = 4;
-      double share = 0.0;
-      for (int part = 0; part < parts * parts; ++part) {
-        const double low = (band + static_cast<double>(part / parts) / parts) / bands;
-        const double left = (turn + static_cast<double>(part % parts) / parts) / turns;
-        for (const auto& [z, wz] : gauss_legendre(6, 2.0 * low - 1.0, 2.0 * (low + 1.0 / (parts * bands)) - 1.0)) {
-          for (const auto& [phi, wphi] :
-               gauss_legendre(6, 2.0 * pi * left, 2.0 * pi * (left + 1.0 / (parts * turns)))) {
-            share += wz * wphi * model.pdf(flat, direction(std::acos(z), phi), wo);
-          }
-        }
-      }
+      const double share = share_of_cell(model, flat, wo, {2.0 * band / bands - 1.0, 2.0 * (band + 1.0) / bands - 1.0},
+                                         {2.0 * pi * turn / turns, 2.0 * pi * (turn + 1.0) / turns});
       total += share;
       const double expected = share * count, seen = hits[static_cast<std::size_t>(band * turns + turn)];
       if (expected < 8.0) continue;
@@ -66,13 +77,18 @@ inline SamplingFit expect_samples_follow_pdf(const Model& model, std::span<const
   return {chi2, cells};
 }
 
+/// |cos θ_i|, or 1 around a fibre, whose S wants no cosine.
+inline double light_weight(const Model& model, const Direction& wi) {
+  return is_hair(model.info->kind) ? 1.0 : std::abs(wi.z);
+}
+
 /// ∫ f |cos θ_i| dω_i by the model's own samples on a midpoint grid of their numbers, the first channel.
 inline double sampled_albedo(const Model& model, std::span<const double> flat, const Direction& wo, int steps) {
   double sum = 0.0;
   for (int i = 0; i < steps * steps; ++i) {
     const Direction wi = model.sample(flat, wo, {(i / steps + 0.5) / steps, (i % steps + 0.5) / steps});
     const double f = model.evaluate(flat, wi, wo).x;
-    if (f != 0.0) sum += f * std::abs(wi.z) / model.pdf(flat, wi, wo);
+    if (f != 0.0) sum += f * light_weight(model, wi) / model.pdf(flat, wi, wo);
   }
   return sum / (steps * steps);
 }
@@ -87,7 +103,7 @@ inline double integrated_albedo(const Model& model, std::span<const double> flat
       for (int k = 0; k < azimuths; ++k) {
         const double azimuth = 2.0 * pi * (k + 0.5) / azimuths;
         const Direction wi{sine * std::cos(azimuth), sine * std::sin(azimuth), z};
-        sum += model.evaluate(flat, wi, wo).x * std::abs(z) * weight * 2.0 * pi / azimuths;
+        sum += model.evaluate(flat, wi, wo).x * light_weight(model, wi) * weight * 2.0 * pi / azimuths;
       }
     }
   }

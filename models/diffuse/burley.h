@@ -2,6 +2,7 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -29,7 +30,7 @@ struct BurleyFactor {
   }
 };
 
-struct Burley {
+struct Burley : CosineSampling {
   static constexpr ModelInfo info{
       .name = "burley",
       .title = "Burley (Disney) diffuse",

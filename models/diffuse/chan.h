@@ -2,10 +2,11 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
-struct Chan2018 {
+struct Chan2018 : CosineSampling {
   static constexpr ModelInfo info{
       .name = "chan_2018",
       .title = "Chan 2018 diffuse (Call of Duty: WWII; Substrate's opaque diffuse)",
@@ -42,7 +43,7 @@ struct Chan2018 {
   }
 };
 
-struct Chan2024 {
+struct Chan2024 : CosineSampling {
   static constexpr ModelInfo info{.name = "chan_2024",
                                   .title = "Chan 2024 diffuse",
                                   .source = "Unpublished; as found in engine sources of 2024",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "models/diffuse/burley.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -22,7 +23,7 @@ struct DisneySubsurfaceFactor {
   }
 };
 
-struct DisneySubsurface {
+struct DisneySubsurface : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "disney_subsurface",
       .title = "Disney subsurface (Hanrahan-Krueger shaped) diffuse",

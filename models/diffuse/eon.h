@@ -2,6 +2,7 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -21,7 +22,7 @@ struct EonAlbedo {
   }
 };
 
-struct Eon {
+struct Eon : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "eon",
       .title = "EON diffuse (energy-preserving Oren-Nayar)",

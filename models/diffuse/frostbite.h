@@ -2,10 +2,11 @@
 #pragma once
 
 #include "models/diffuse/burley.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
-struct FrostbiteBurley {
+struct FrostbiteBurley : CosineSampling {
   static constexpr ModelInfo info{
       .name = "frostbite_burley",
       .title = "Frostbite's renormalised Burley diffuse",

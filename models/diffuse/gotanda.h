@@ -3,10 +3,11 @@
 
 #include "models/diffuse/one_minus_power.h"
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
-struct Gotanda2012 {
+struct Gotanda2012 : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "gotanda_2012",
       .title = "Gotanda 2012 diffuse",
@@ -106,7 +107,7 @@ struct Gotanda2014Visibility {
   }
 };
 
-struct Gotanda2014 {
+struct Gotanda2014 : CosineSampling {
   static constexpr ModelInfo info{
       .name = "gotanda_2014",
       .title = "Gotanda 2014 diffuse",
@@ -135,7 +136,7 @@ struct Gotanda2014 {
   }
 };
 
-struct Gotanda2014Unreal {
+struct Gotanda2014Unreal : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "gotanda_2014_unreal",
       .title = "Gotanda 2014 diffuse, Unreal Engine's copy",

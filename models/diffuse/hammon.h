@@ -2,10 +2,11 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
-struct Hammon {
+struct Hammon : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "hammon",
       .title = "Hammon 2017 diffuse",

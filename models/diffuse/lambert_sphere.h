@@ -3,6 +3,7 @@
 
 #include "models/diffuse/one_minus_power.h"
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -41,7 +42,7 @@ struct LambertSpherePhase {
   }
 };
 
-struct LambertSphere {
+struct LambertSphere : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "lambert_sphere",
       .title = "Lambert-sphere diffuse, fast form",

@@ -2,10 +2,11 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
-struct OrenNayar {
+struct OrenNayar : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "oren_nayar",
       .title = "Oren-Nayar diffuse, full form",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -12,7 +13,7 @@ inline constexpr ParameterInfo sigma_parameter{.name = "sigma",
                                                .initial = 0.3,
                                                .doc = "Standard deviation of the facets' slope angles."};
 
-struct OrenNayarQualitative {
+struct OrenNayarQualitative : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "oren_nayar_qualitative",
       .title = "Oren-Nayar diffuse, qualitative form",
@@ -47,7 +48,7 @@ struct OrenNayarQualitative {
   }
 };
 
-struct FujiiOrenNayar {
+struct FujiiOrenNayar : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "fujii_oren_nayar",
       .title = "Fujii's improved Oren-Nayar diffuse",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "models/model.h"
+#include "models/sampling.h"
 
 namespace lobefit {
 
@@ -65,7 +66,7 @@ constexpr void describe_proxima(P& p, Visit&& visit) {
                                   .doc = "Exponent of the fade in cos theta_k = -dot(V, L)."});
 }
 
-struct Proxima {
+struct Proxima : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "proxima",
       .title = "Proxima diffuse (The Callisto Protocol)",
@@ -90,7 +91,7 @@ struct Proxima {
   }
 };
 
-struct ProximaUnclamped {
+struct ProximaUnclamped : GrazingSampling {
   static constexpr ModelInfo info{
       .name = "proxima_unclamped",
       .title = "Proxima diffuse, the slide's form without clamp",

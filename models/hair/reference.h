@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "models/hair/longitudinal.h"
+#include "models/hair/reference_lobes.h"
 #include "models/model.h"
 
 namespace lobefit {
@@ -139,6 +140,14 @@ struct HairReference {
     Vec3<T> inside = transmitted(p, phi, inclinations.cos_theta_d, inverse_index, cos_theta_t, f0, width_tt, width_trt,
                                  m_tt, m_trt, std::make_integer_sequence<int, pairs>{});
     return inside * (0.5 / pairs) + m_r * n_r * f_r * (0.5 / pairs);
+  }
+
+  /// Over the whole sphere, lobe by lobe and ray by ray.
+  static Direction sample(const Parameters<double>& p, const Direction& wo, const std::array<double, 2>& u) {
+    return HairReferenceLobes<pairs, Parameters<double>>(p, wo).sample(u);
+  }
+  static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
+    return HairReferenceLobes<pairs, Parameters<double>>(p, wo).pdf(wi);
   }
 
  private:

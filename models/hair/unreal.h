@@ -1,36 +1,12 @@
 // Unreal Engine's hair (S3), with every constant that was fitted a parameter.
 #pragma once
 
+#include "models/hair/absorption.h"
 #include "models/hair/fibre.h"
+#include "models/hair/unreal_lobes.h"
 #include "models/model.h"
 
 namespace lobefit {
-
-/// Transmittance per channel: color^linear exp(-quadratic ln² color).
-struct HairAbsorption {
-  static constexpr const char* name = "hair_absorption";
-  static constexpr std::array arguments{"color", "linear_part", "quadratic_part"};
-
-  template <class V, class E, class Q>
-  LOBEFIT_TEXT static auto evaluate(const V& color, const E& linear, const Q& quadratic) {
-    const auto l = let("l", V{log(color.x), log(color.y), log(color.z)});
-    const auto exponent = let("exponent", l * (linear - quadratic * l));
-    return V{exp(exponent.x), exp(exponent.y), exp(exponent.z)};
-  }
-};
-
-/// HairColorToAbsorption, which S3 calls and does not define: σ = (ln C/D(b))², with Chiang et al. 2016's D, a fit of
-/// the colour of a whole head of hair over the azimuthal roughness b. Its coefficients are no parameters here: only the
-/// number D enters, and b moves it.
-struct ChiangAbsorptionScale {
-  static constexpr const char* name = "chiang_absorption_scale";
-  static constexpr std::array arguments{"b"};
-
-  template <class B>
-  LOBEFIT_TEXT static constexpr auto evaluate(const B& b) {
-    return 5.969 + b * (-0.215 + b * (2.532 + b * (-10.73 + b * (5.574 + b * 0.245))));
-  }
-};
 
 /// S = Σ M N over R, TT and TRT, each factor an approximation of d'Eon's. S3's text and code, and where they differ:
 ///
@@ -186,7 +162,7 @@ struct HairUnreal {
     const auto legacy = p.absorption_form < 0.5;
     const T linear = let("linear_part", select(legacy, p.tt_absorption * sqrt(1.0 - inner) / cos_theta_d, T(0.0)));
     const T quadratic = let("quadratic_part", select(legacy, T(0.0), 2.0 * length / (d_b * d_b)));
-    Vec3<T> t_tt = let("t_tt", call<HairAbsorption>(p.base_color, linear, quadratic));
+    Vec3<T> t_tt = let("t_tt", call<HairTransmittance>(p.base_color, linear, quadratic));
     const T n_tt = let("n_tt", exp(-p.tt_azimuth_cosine * cos_phi - p.tt_azimuth_constant));
     const T tt = let("tt", call<HairGaussian>(p.width_tt * width, sines - p.tilt_tt * p.shift) *
                                (n_tt * square(enters_tt) * p.backlit));
@@ -206,6 +182,14 @@ struct HairUnreal {
     Vec3<T> scattered = call<HairColorPower>(p.base_color, T(0.5)) * (p.scatter * diffuse);
 
     return t_tt * tt + t_trt * trt + scattered + r;
+  }
+
+  /// Over the whole sphere, lobe by lobe.
+  static Direction sample(const Parameters<double>& p, const Direction& wo, const std::array<double, 2>& u) {
+    return HairUnrealLobes(p, wo).sample(u);
+  }
+  static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
+    return HairUnrealLobes(p, wo).pdf(wi);
   }
 };
 

@@ -114,6 +114,17 @@ double reflected_density(const Direction& wi, const Direction& wo, Density&& fac
   return cosine > 0.0 ? facet_density(m) / (4.0 * cosine) : 0.0;
 }
 
+/// A mirror direction at any facet, whichever of its sides wo is on: no sample is lost.
+inline Direction sample_reflection(Distribution distribution, Alpha alpha, const Direction& wo,
+                                   const std::array<double, 2>& u) {
+  return reflect(wo, sample_facet(distribution, alpha, u));
+}
+inline double reflection_density(Distribution distribution, Alpha alpha, const Direction& wi, const Direction& wo) {
+  return reflected_density(wi, wo, [&](const Direction& m) {
+    return facet_sampling_density(distribution, alpha, {m.x, m.y, abs(m.z)});
+  });
+}
+
 /// A mirror direction at a facet that wo sees.
 inline Direction sample_visible_reflection(Distribution distribution, Alpha alpha, const Direction& wo,
                                            const std::array<double, 2>& u) {

@@ -5,6 +5,8 @@
 #include "models/microfacet/fresnel.h"
 #include "models/microfacet/masking.h"
 #include "models/microfacet/normal_distribution.h"
+#include "models/microfacet/sampling.h"
+#include "models/sampling.h"
 #include "models/specular/ggx.h"
 
 namespace lobefit {
@@ -94,7 +96,36 @@ struct SpecularKaris {
     return (choice_number(last[0], 4) * 8 + choice_number(last[1], 8)) * 3 + choice_number(last[2], 3);
   }
 
+  /// By the facets that wo sees, and in some share by all of them.
+  static Direction sample(const Parameters<double>& p, const Direction& wo, std::array<double, 2> u) {
+    const double visible = visible_share(p);
+    return pick_lobe<2>({visible, 1.0 - visible}, u) == 0
+               ? sample_visible_reflection(sampled_distribution(p), sampled_alphas(p), wo, u)
+               : sample_reflection(sampled_distribution(p), sampled_alphas(p), wo, u);
+  }
+  static double pdf(const Parameters<double>& p, const Direction& wi, const Direction& wo) {
+    return lerp(reflection_density(sampled_distribution(p), sampled_alphas(p), wi, wo),
+                visible_reflection_density(sampled_distribution(p), sampled_alphas(p), wi, wo), visible_share(p));
+  }
+
  private:
+  /// GGX's facets for Blinn-Phong's too, which have no Smith function: at the same alpha D is at most 4/e of GGX's,
+  /// whose tail is the longer.
+  static Distribution sampled_distribution(const Parameters<double>& p) {
+    return choice_number(p.distribution, 4) == 1 ? Distribution::beckmann : Distribution::ggx;
+  }
+  static Alpha sampled_alphas(const Parameters<double>& p) {
+    if (choice_number(p.distribution, 4) < 3) return p.alpha;
+    const AlphaPair<double> alpha = BurleyAnisotropy::evaluate(p.alpha, p.anisotropy);
+    return {alpha.x, alpha.y};
+  }
+  /// Cook-Torrance's and Kelemen's grooves hide less than Smith's facets: next to the horizon they show many that
+  /// Smith's hardly ever do.
+  static double visible_share(const Parameters<double>& p) {
+    const int masking = choice_number(p.masking, 8);
+    return masking == 2 || masking == 3 ? 0.5 : 1.0;
+  }
+
   template <class T, class G>
   LOBEFIT_TEXT static Vec3<T> product(const T& d, const T& masking, const Vec3<T>& fresnel, const Geometry<G>& g) {
     // Next to the horizon the denominator would underflow in float; D over it must not overflow.

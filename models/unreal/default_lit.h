@@ -145,13 +145,7 @@ struct UnrealLobes {
   }
   double pdf(const Direction& wi, const Direction& wo) const {
     const double specular = visible_reflection_density(Distribution::ggx, alpha, wi, wo);
-    return shares[0] * cosine_density(wi) + shares[1] * specular + shares[2] / (4.0 * pi);
-  }
-
- private:
-  static Direction sample_sphere(const std::array<double, 2>& u) {
-    const double z = 1.0 - 2.0 * u[0], radius = sqrt(1.0 - z * z), azimuth = 2.0 * pi * u[1];
-    return {radius * std::cos(azimuth), radius * std::sin(azimuth), z};
+    return shares[0] * cosine_density(wi) + shares[1] * specular + shares[2] * sphere_density;
   }
 };
 
