@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "reference/json_reader.h"
 #include "reference/output_file.h"
 #include "report/material_figure.h"
 
@@ -102,12 +103,11 @@ bool is_dense_measurement(const BrdfFile& file) {
   return file.rgl && file.rgl->isotropic();
 }
 
-FitOptions options_of(const FitSettings& settings, bool measured, const Context& context) {
+FitOptions options_of(const FitSettings& settings, const FitTable& table, const Context& context) {
+  const bool measured = table.dense;
   FitOptions options;
   options.quantity = parse_quantity(settings.metric);
-  options.weights = parse_weights(!settings.weights.empty() ? settings.weights
-                                  : measured                ? "sin_theta_i,sin_theta_o"
-                                                            : "uniform");
+  options.weights = table.weights;
   parse_loss(settings.loss, options);
   for (const std::string& text : settings.mappings) options.mappings.push_back(AxisMapping::parse(text));
   options.staged = settings.staged || (measured && !settings.not_staged);
@@ -157,14 +157,48 @@ std::string FitSource::name() const {
   return material.empty() ? std::filesystem::path(path).stem().string() : material;
 }
 
+FitTable read_fit_table(const FitSource& source, const std::string& grid, const std::string& weights) {
+  FitTable taken{.file = read_brdf_file(source.path, {.material = source.material}), .grid = grid};
+  taken.dense = is_dense_measurement(taken.file);
+  if (grid == "auto") taken.grid = taken.dense ? "measured" : "native";
+  if (taken.grid != "native") taken.file.table = taken.file.resampled(Grid::named_or_file(taken.grid), true);
+  taken.weights = parse_weights(!weights.empty() ? weights : taken.dense ? "sin_theta_i,sin_theta_o" : "uniform");
+  return taken;
+}
+
+FitProvenance fit_provenance(const std::string& path) {
+  const Json json = parse_json(read_file(path), path);
+  const JsonReader reader(json, path);
+  FitProvenance result;
+  if (reader.has("solver")) {
+    const JsonReader solver = reader.at("solver");
+    if (solver.has("metric")) result.metric = solver.at("metric").text();
+    if (solver.has("weights")) {
+      for (const JsonReader& weight : solver.at("weights").elements())
+        result.weights += (result.weights.empty() ? "" : ",") + weight.text();
+      if (result.weights.empty()) result.weights = "uniform";
+    }
+  }
+  if (reader.has("provenance")) {
+    const JsonReader provenance = reader.at("provenance");
+    if (provenance.has("grid")) result.grid = provenance.at("grid").text();
+    if (provenance.has("material")) result.material = provenance.at("material").text();
+    if (provenance.has("table_sha256")) result.table_sha256 = provenance.at("table_sha256").text();
+  }
+  try {
+    parse_quantity(result.metric);
+    if (!result.weights.empty()) parse_weights(result.weights);
+  } catch (const Error& error) {
+    throw error.inside(ExitCode::invalid_input, path + ", $.solver");
+  }
+  return result;
+}
+
 FitJob run_fit(const FitSettings& settings, const FitSource& source, const Context& context, Monitor& monitor) {
-  BrdfFile file = read_brdf_file(source.path, {.material = source.material});
-  FitJob job{.grid = settings.grid};
-  const bool dense = is_dense_measurement(file);
-  if (job.grid == "auto") job.grid = dense ? "measured" : "native";
-  if (job.grid != "native") file.table = file.resampled(Grid::named_or_file(job.grid), true);
-  const Table& table = file.table;
-  FitOptions options = options_of(settings, dense, context);
+  const FitTable taken = read_fit_table(source, settings.grid, settings.weights);
+  const Table& table = taken.file.table;
+  FitJob job{.grid = taken.grid};
+  FitOptions options = options_of(settings, taken, context);
   ParameterValues values = with_table_parameters(settings.model->defaults(), table);
   options.free = choose_free(settings, table, options, values);
   options.bounds = choose_bounds(settings, options.staged, values);
@@ -186,14 +220,14 @@ FitJob run_fit(const FitSettings& settings, const FitSource& source, const Conte
   if (!job.tiers.empty()) job.document["tiers"] = tiers_json(job.tiers);
   const TableModel on_table(*settings.model, job.fit.values(), table, job.fit.mappings);
   const Table fitted = on_table.render();
-  job.report = metrics_report(model_pair(file, on_table, fitted.values), {.sphere_size = settings.sphere});
+  job.report = metrics_report(model_pair(taken.file, on_table, fitted.values), {.sphere_size = settings.sphere});
   job.document["report"] = job.report.json(table);
   if (settings.figure) {
     const auto rms = std::ranges::find(job.fit.metrics, settings.metric, &FitMetric::name);
-    job.figure = material_figure(table, fitted.values, sphere_pair(model_pair(file, on_table, fitted.values)),
+    job.figure = material_figure(table, fitted.values, sphere_pair(model_pair(taken.file, on_table, fitted.values)),
                                  source.name() + " and " + job.fit.model,
-                                 fmt::format("points: {}; lines: fit, rms {} {:.4g}", dense ? "measured" : "table",
-                                             settings.metric, rms->value));
+                                 fmt::format("points: {}; lines: fit, rms {} {:.4g}",
+                                             taken.dense ? "measured" : "table", settings.metric, rms->value));
   }
   return job;
 }

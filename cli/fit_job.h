@@ -32,12 +32,30 @@ struct FitSource {
   std::string name() const;
 };
 
+/// A file as a fit takes it.
+struct FitTable {
+  BrdfFile file;     // its table on the grid
+  std::string grid;  // "native" or a grid's name
+  std::vector<WeightFactor> weights;
+  bool dense = false;  // a dense isotropic measurement
+};
+
+/// `grid` and `weights` as in FitSettings: "auto" and "" are as suits the file.
+FitTable read_fit_table(const FitSource& source, const std::string& grid, const std::string& weights);
+
+/// How a fit took its table, by its JSON file; what the file doesn't say is left to suit the table.
+struct FitProvenance {
+  std::string grid = "auto", weights, metric = "log", material, table_sha256;
+};
+/// Throws Error(invalid_input).
+FitProvenance fit_provenance(const std::string& path);
+
 struct FitJob {
   Fit fit;
   std::vector<TierFit> tiers;  // empty unless they were compared
   std::string grid;            // "native" or a grid's name
   MetricsReport report;
-  std::string figure;          // a gnuplot program, if the settings ask for one
+  std::string figure;  // a gnuplot program, if the settings ask for one
   Json document;
 };
 

@@ -21,25 +21,11 @@ namespace {
 
 constexpr std::array<const char*, 3> channel_suffixes{".r", ".g", ".b"};
 
-/// rms_difference() of every quantity, in one pass.
 std::vector<FitMetric> all_metrics(const Table& table, std::span<const float> values,
                                    const std::vector<double>& weights) {
-  std::array<double, quantity_names.size()> sums{};
-  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
-    if (weights[entry] == 0.0) continue;
-    const double cos_theta_i = table.wi(entry).z;
-    for (int c = 0; c < table.channels; ++c) {
-      const double model = values[static_cast<std::size_t>(c) * table.entries() + entry], truth = table.value(entry, c);
-      for (std::size_t q = 0; q < sums.size(); ++q) {
-        const auto quantity = static_cast<Quantity>(q);
-        sums[q] += weights[entry] * square(transform(quantity, model, cos_theta_i).value -
-                                           transform(quantity, truth, cos_theta_i).value);
-      }
-    }
-  }
+  const QuantityErrors errors = rms_differences(table, values, weights);
   std::vector<FitMetric> metrics;
-  for (std::size_t q = 0; q < sums.size(); ++q)
-    metrics.push_back({std::string(quantity_names[q]), std::sqrt(sums[q] / table.channels)});
+  for (std::size_t q = 0; q < errors.size(); ++q) metrics.push_back({std::string(quantity_names[q]), errors[q]});
   return metrics;
 }
 

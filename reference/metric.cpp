@@ -118,4 +118,22 @@ double rms_difference(const Table& table, std::span<const float> values, Quantit
   return std::sqrt(sum / table.channels);
 }
 
+QuantityErrors rms_differences(const Table& table, std::span<const float> values, const std::vector<double>& weights) {
+  QuantityErrors sums{};
+  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+    if (weights[entry] == 0.0) continue;
+    const double cos_theta_i = table.wi(entry).z;
+    for (int c = 0; c < table.channels; ++c) {
+      const double other = values[static_cast<std::size_t>(c) * table.entries() + entry], truth = table.value(entry, c);
+      for (std::size_t q = 0; q < sums.size(); ++q) {
+        const auto quantity = static_cast<Quantity>(q);
+        sums[q] += weights[entry] * square(transform(quantity, other, cos_theta_i).value -
+                                           transform(quantity, truth, cos_theta_i).value);
+      }
+    }
+  }
+  for (double& sum : sums) sum = std::sqrt(sum / table.channels);
+  return sums;
+}
+
 }  // namespace lobefit

@@ -1,6 +1,7 @@
 // How far two BRDFs are apart: a quantity, weights over the grid, and their mean square.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <span>
 #include <string>
@@ -54,5 +55,9 @@ std::vector<double> entry_weights(const Table& table, const std::vector<WeightFa
 /// Table::values.
 double rms_difference(const Table& table, std::span<const float> values, Quantity quantity,
                       const std::vector<double>& weights);
+
+/// rms_difference() of every quantity, in one pass.
+using QuantityErrors = std::array<double, quantity_names.size()>;
+QuantityErrors rms_differences(const Table& table, std::span<const float> values, const std::vector<double>& weights);
 
 }  // namespace lobefit

@@ -352,6 +352,103 @@ TEST_F(CommandLine, FitCheckExportHangTogether) {
   expect_refused("check fit.json --device vulkan", 6, {"Vulkan"});
 }
 
+TEST_F(CommandLine, ExportToTheGBufferTellsWhatIsLost) {
+  const auto parameter = [](const Json& document, const std::string& name) {
+    for (const Json& p : document["params"]) {
+      if (p["name"] == name) return p;
+    }
+    ADD_FAILURE() << name;
+    return Json();
+  };
+  // Bytes 51, 102, 153 of linear fields, sRGB's 188 of the albedo: nothing is lost, at any precision of the text.
+  const std::string exact =
+      "callisto_ue427 --set albedo=0.50288645803256838 --set roughness=0.4 --set diffuse_fresnel=51.2 "
+      "--set retroreflection=0.6 --set diffuse_fresnel_falloff=0.2 --set retroreflection_falloff=0.8 "
+      "--set terminator_length=0.2 --set f0=0.032 --set specular_fresnel_falloff=0.6";
+  const Json kept = json("export " + exact + " --gbuffer");
+  EXPECT_EQ(kept["pixel"]["GBufferC"], (Json{188, 188, 188, 204}));
+  EXPECT_EQ(kept["pixel"]["GBufferB"], (Json{0, 102, 102, 0}));
+  EXPECT_EQ(kept["pixel"]["GBufferD"], (Json{153, 153, 51, 51}));
+  EXPECT_EQ(kept["pixel"]["GBufferF"], (Json{0, 0, 0, 51}));
+  EXPECT_EQ(kept["error"]["grid"], "measured");
+  EXPECT_FALSE(kept["error"].contains("rms"));
+  for (const auto& [quantity, difference] : kept["error"]["differences"].items()) {
+    EXPECT_EQ(difference["port_fit"], 0.0) << quantity;
+    EXPECT_LT(difference["packed_fit"], 1e-7) << quantity;
+  }
+
+  const std::string lossy =
+      "export callisto --set retroreflection=2 --set terminator=0.8 --set f0=0.2,0.1,0.05 --gbuffer";
+  const Json lost = json(lossy);
+  EXPECT_EQ(parameter(lost, "retroreflection")["losses"][0]["kind"], "clamped");
+  EXPECT_EQ(parameter(lost, "retroreflection")["decoded"], 1.0);
+  EXPECT_EQ(parameter(lost, "retroreflection")["field"]["place"], "GBufferD.g");
+  EXPECT_EQ(parameter(lost, "terminator")["losses"][0]["kind"], "dropped");
+  EXPECT_TRUE(parameter(lost, "terminator")["field"].is_null());
+  EXPECT_EQ(parameter(lost, "f0")["losses"].size(), 2u);  // grey, and clamped to .08 exactly
+  EXPECT_EQ(parameter(lost, "f0")["decoded"], (Json{0.08, 0.08, 0.08}));
+  EXPECT_EQ(parameter(lost, "dual_specular")["value"], "mix");
+  for (const char* column : {"port_fit", "packed_port", "packed_fit"})
+    EXPECT_GT(lost["error"]["differences"]["log"][column], 1e-4) << column;
+  const std::string text = run(lossy).out;
+  for (const char* fragment : {"2 clamped to 1, the most that CustomData.g holds", "GBufferD.g 255",
+                               "always has weight 0.5", "Metallic is 0", "grid measured", "packed - fit"})
+    EXPECT_NE(text.find(fragment), std::string::npos) << fragment << "\n" << text;
+  const Json lit = json("export " + exact + " --gbuffer --static-lighting");
+  EXPECT_EQ(parameter(lit, "retroreflection_falloff")["decoded"], 1.0);
+  EXPECT_GT(lit["error"]["differences"]["log"]["packed_port"], 1e-4);
+
+  const Json metal = json("export " + exact + " --set albedo=0 --set f0=0.8,0.4,0.2 --gbuffer --metallic");
+  EXPECT_EQ(metal["pixel"]["GBufferB"][0], 255);
+  EXPECT_LT(metal["error"]["differences"]["log"]["packed_fit"], 1e-3);
+
+  ASSERT_EQ(run("export callisto --gbuffer -o g.txt").code, 0);
+  expect_refused("export callisto --gbuffer -o g.txt", 2, {"g.txt", "--force"});
+  expect_refused("export callisto --gbuffer --lang hlsl", 2, {"--gbuffer", "--lang"});
+  expect_refused("export callisto --table t.exr", 2, {"--table", "--gbuffer"});
+  expect_refused("export callisto --static-lighting", 2, {"--static-lighting", "--gbuffer"});
+  expect_refused("export callisto --metallic", 2, {"--metallic", "--gbuffer"});
+  expect_refused("export eon --gbuffer", 2, {"eon", "callisto_ue427"});
+  expect_refused("export callisto --gbuffer --table absent.exr", 3, {"absent.exr"});
+}
+
+TEST_F(CommandLine, ExportToTheGBufferScoresAFitAsTheFitDid) {
+  const std::string material = "render callisto_ue427 --set albedo=0.3 --set f0=0.05 --set terminator_length=0.33 ";
+  ASSERT_EQ(run(material + "--set roughness=0.37 --grid small -o t.exr").code, 0);
+  const std::string fit = "fit callisto t.exr --weights sin_theta_i,cos_theta_o --free albedo,alpha,f0,terminator ";
+  ASSERT_EQ(run(fit + "-o fit.json").code, 0);
+  const Json fitted = Json::parse(content(folder_ / "fit.json"));
+  const Json scored = json("export fit.json --gbuffer --table t.exr");
+  EXPECT_EQ(scored["error"]["grid"], "native");
+  EXPECT_EQ(scored["error"]["weights"], (Json{"sin_theta_i", "cos_theta_o"}));
+  for (const auto& [quantity, stages] : scored["error"]["rms"].items()) {
+    EXPECT_EQ(stages["fit"], fitted["metrics"][quantity]) << quantity;
+    EXPECT_NE(stages["port"], stages["fit"]) << quantity;
+    EXPECT_NE(stages["packed"], stages["port"]) << quantity;
+  }
+  // On another grid than the table's own, which the fit remembers.
+  ASSERT_EQ(run(fit + "--grid small -o small.json").code, 0);
+  EXPECT_EQ(json("export small.json --gbuffer --table t.exr")["error"]["grid"], "small");
+  ASSERT_EQ(run(material + "--set roughness=0.5 --grid small -o other.exr").code, 0);
+  EXPECT_NE(run("export fit.json --gbuffer --table other.exr").err.find("not the table"), std::string::npos);
+
+  // An axis gives every row its own material: which one, the settings say.
+  ASSERT_EQ(run(material + "--axis roughness=0.2,0.6 --grid small -o rows.exr").code, 0);
+  ASSERT_EQ(run("fit callisto_ue427 rows.exr --free albedo -o rows.json").code, 0);
+  expect_refused("export rows.json --gbuffer", 2, {"roughness", "--set roughness=VALUE"});
+  expect_refused("export rows.json --gbuffer --table rows.exr", 2, {"roughness", "--set roughness=VALUE"});
+  expect_refused("export rows.json --gbuffer --table t.exr --quiet", 2, {"roughness", "--set roughness=VALUE"});
+  const Json second = json("export rows.json --gbuffer --table rows.exr --set roughness=0.6");
+  EXPECT_EQ(second["pixel"]["GBufferB"][2], 153);
+  EXPECT_LT(second["error"]["rms"]["log"]["fit"], 1e-6);
+  EXPECT_EQ(json("export rows.json --gbuffer --set roughness=0.2")["pixel"]["GBufferB"][2], 51);
+
+  std::string broken = content(folder_ / "fit.json");
+  broken.replace(broken.find("sin_theta_i"), 11, "sin_theta_x");
+  std::ofstream(folder_ / "broken.json") << broken;
+  expect_refused("export broken.json --gbuffer --table t.exr", 3, {"broken.json", "$.solver", "sin_theta_x"});
+}
+
 TEST_F(CommandLine, ParametersWithoutEffectAreNamedNotReported) {
   std::ofstream(folder_ / "slice.json") << R"({"theta_i":[0,20,40,60,80],"theta_o":[0],"phi":[0]})";
   ASSERT_EQ(run("render microfacet_diffuse --grid slice.json --axis alpha=0.3,0.9 --exact -o t.exr").code, 0);

@@ -1,6 +1,7 @@
 #include "reference/formats/utia.h"
 
 #include "reference/formats/byte_reader.h"
+#include "reference/srgb.h"
 
 namespace lobefit {
 
@@ -12,8 +13,7 @@ Table Utia::parse(std::string_view bytes, Scale scale, const std::string& place)
   }
   const auto decode = [&](double value) {
     if (scale == Scale::raw) return value;
-    const double coded = value / 140.0;
-    return 100.0 * (coded <= 0.04045 ? coded / 12.92 : std::pow((coded + 0.055) / 1.055, 2.4));
+    return 100.0 * srgb_decode(value / 140.0);
   };
   Table table;
   table.coordinates = Coordinates::list;
