@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "models/error.h"
+#include "reference/srgb.h"
 #include "report/figure_layout.h"
 
 namespace lobefit {
@@ -32,11 +33,9 @@ std::vector<std::pair<double, std::size_t>> plane_of_incidence(const Table& tabl
   return line;
 }
 
-/// 8-bit sRGB (IEC 61966-2-1) of a linear radiance.
+/// 8-bit sRGB of a linear radiance.
 int display(double radiance) {
-  const double x = std::clamp(radiance, 0.0, 1.0);
-  const double encoded = x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1.0 / 2.4) - 0.055;
-  return static_cast<int>(std::lround(255.0 * encoded));
+  return static_cast<int>(std::lround(255.0 * srgb_encode(std::clamp(radiance, 0.0, 1.0))));
 }
 
 /// Datablocks of the spheres on white, at the exposure that shows a twentieth of the first one's pixels at full white.
