@@ -23,7 +23,8 @@ enum class Loss { none, huber, cauchy };
 inline constexpr std::array<std::string_view, 3> loss_names{"none", "huber", "cauchy"};
 
 /// What intervals are made of: the table's own errors; or how far the result would move had other blocks of directions
-/// been measured, for tables that state no errors (cluster-robust, 45 pairs of polar-angle ranges).
+/// been measured, for tables that state no errors (cluster-robust over 45 pairs of nine ranges of polar angles, pairs
+/// with a range in common dependent).
 enum class Intervals { data, blocks };
 inline constexpr std::array<std::string_view, 2> intervals_names{"data", "blocks"};
 

@@ -185,6 +185,8 @@ int direction_block(const Direction& wi, const Direction& wo) {
   return 9 * std::max(a, b) + std::min(a, b);
 }
 
+std::pair<int, int> ranges_of_block(int block) { return {block / 9, block % 9}; }
+
 bool is_channelwise(const Model& model) {
   static std::mutex mutex;
   static std::map<std::string, bool, std::less<>> known;
@@ -239,9 +241,12 @@ TableProblem::TableProblem(const Model& model, const ParameterValues& values, co
       batch.block.push_back(direction_block(batch.wi.back(), batch.wo.back()));
     residual_count_ += static_cast<std::size_t>(table.channels);
   }
-  std::set<int> blocks;
+  std::set<int> ranges;
   for (Batch& batch : batches_) {
-    blocks.insert(batch.block.begin(), batch.block.end());
+    for (const int block : batch.block) {
+      const auto [first, second] = ranges_of_block(block);
+      ranges.insert({first, second});
+    }
     for (const std::size_t entry : batch.entries) has_errors_ = has_errors_ || table.standard_error(entry) > 0.0f;
     for (int c = 0; c < table.channels; ++c) {
       for (std::size_t i = 0; i < batch.entries.size(); ++i) {
@@ -250,7 +255,7 @@ TableProblem::TableProblem(const Model& model, const ParameterValues& values, co
       }
     }
   }
-  block_count_ = static_cast<int>(blocks.size());
+  range_count_ = static_cast<int>(ranges.size());
 }
 
 LeastSquaresProblem TableProblem::problem(std::vector<double> start, const TableProblem* curvature_sample) const {
@@ -277,8 +282,8 @@ LeastSquaresProblem TableProblem::problem(std::vector<double> start, const Table
     };
   }
   if (options_.intervals == Intervals::blocks) {
-    if (block_count_ > 1) {
-      result.degrees_of_freedom = block_count_ - 1;
+    if (range_count_ > 1) {
+      result.degrees_of_freedom = range_count_ - 1;
       result.gradient_covariance = [this](std::span<const double> x) { return block_covariance(x); };
     }
   } else if (has_errors_) {
@@ -520,9 +525,10 @@ std::vector<double> TableProblem::data_covariance(std::span<const double> x) con
   return covariance;
 }
 
-/// G/(G-1) Σ over blocks of g gᵀ with g = Jᵀr of the block: what the gradient owes to the choice of directions
-/// (cluster-robust covariance, Liang & Zeger 1986). Misfit runs smoothly over neighbouring directions, so that single
-/// entries are no independent witnesses; blocks come closer.
+/// What the gradient owes to the choice of directions: the covariance of Σ g over blocks, g = Jᵀr of a block, where
+/// blocks that have a range of polar angles in common are not independent (dyadic clusters: Aronow, Samii & Assenova
+/// 2015, equation 7). Misfit runs smoothly over neighbouring directions, so that single entries are no witnesses at
+/// all, and along a whole range when light or view stays there.
 std::vector<double> TableProblem::block_covariance(std::span<const double> x) const {
   const std::size_t p = x.size();
   std::vector<std::map<int, std::vector<double>>> parts(batches_.size());
@@ -547,13 +553,26 @@ std::vector<double> TableProblem::block_covariance(std::span<const double> x) co
       for (std::size_t k = 0; k < p; ++k) sum[k] += g[k];
     }
   }
-  const auto count = static_cast<double>(blocks.size());
-  std::vector<double> covariance(p * p, 0.0);
-  for (const auto& [block, g] : blocks) {
-    for (std::size_t k = 0; k < p; ++k) {
-      for (std::size_t l = 0; l < p; ++l) covariance[k * p + l] += count / (count - 1.0) * g[k] * g[l];
+  std::map<int, Eigen::VectorXd> ranges;
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p));
+  for (const auto& [block, values] : blocks) {
+    const Eigen::Map<const Eigen::VectorXd> g(values.data(), static_cast<Eigen::Index>(p));
+    const auto [first, second] = ranges_of_block(block);
+    for (const int range : {first, second}) {
+      Eigen::VectorXd& of_range = ranges.try_emplace(range, Eigen::VectorXd::Zero(g.size())).first->second;
+      of_range += g;
+      if (first == second) break;
     }
+    // Counted by both of its ranges.
+    if (first != second) sum -= g * g.transpose();
   }
+  for (const auto& [range, g] : ranges) sum += g * g.transpose();
+  const auto count = static_cast<double>(ranges.size());
+  // A difference of sums of squares may come out indefinite; a covariance is not.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sum);
+  const RowMatrix clipped = count / (count - 1.0) * eigen.eigenvectors() *
+                            eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
+  std::vector<double> covariance(clipped.data(), clipped.data() + clipped.size());
   return covariance;
 }
 

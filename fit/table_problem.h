@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "fit/dual_model.h"
@@ -47,6 +48,7 @@ struct FitVariables {
 /// The unordered pair of ranges, a ninth of the quarter circle each, that two polar angles fall into: reciprocal twins
 /// of an entry share its block.
 int direction_block(const Direction& wi, const Direction& wo);
+std::pair<int, int> ranges_of_block(int block);
 
 /// Whether channel c of the model follows channel c of its colours alone. Found by derivatives at parameters and
 /// directions drawn from their ranges.
@@ -114,7 +116,7 @@ class TableProblem {
   std::vector<Batch> batches_;
   std::size_t residual_count_ = 0;
   bool has_errors_ = false;
-  int block_count_ = 0;
+  int range_count_ = 0;  // of polar angles, of which blocks are pairs
 };
 
 }  // namespace lobefit
