@@ -554,25 +554,27 @@ std::vector<double> TableProblem::block_covariance(std::span<const double> x) co
     }
   }
   std::map<int, Eigen::VectorXd> ranges;
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(p));
+  const auto size = static_cast<Eigen::Index>(p);
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(size, size), shared = own;
   for (const auto& [block, values] : blocks) {
-    const Eigen::Map<const Eigen::VectorXd> g(values.data(), static_cast<Eigen::Index>(p));
+    const Eigen::Map<const Eigen::VectorXd> g(values.data(), size);
     const auto [first, second] = ranges_of_block(block);
-    for (const int range : {first, second}) {
-      Eigen::VectorXd& of_range = ranges.try_emplace(range, Eigen::VectorXd::Zero(g.size())).first->second;
-      of_range += g;
-      if (first == second) break;
-    }
-    // Counted by both of its ranges.
-    if (first != second) sum -= g * g.transpose();
+    ranges.try_emplace(first, Eigen::VectorXd::Zero(size)).first->second += g;
+    own += g * g.transpose();
+    shared -= g * g.transpose();
+    if (first == second) continue;
+    ranges.try_emplace(second, Eigen::VectorXd::Zero(size)).first->second += g;
+    shared -= g * g.transpose();
   }
-  for (const auto& [range, g] : ranges) sum += g * g.transpose();
+  for (const auto& [range, g] : ranges) shared += g * g.transpose();
+  // What pairs of different blocks add is a difference of squares and may come out negative: then it counts as nothing,
+  // and the blocks' own squares remain.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(shared);
   const auto count = static_cast<double>(ranges.size());
-  // A difference of sums of squares may come out indefinite; a covariance is not.
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(sum);
-  const RowMatrix clipped = count / (count - 1.0) * eigen.eigenvectors() *
-                            eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
-  std::vector<double> covariance(clipped.data(), clipped.data() + clipped.size());
+  const RowMatrix sum =
+      count / (count - 1.0) *
+      (own + eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose());
+  std::vector<double> covariance(sum.data(), sum.data() + sum.size());
   return covariance;
 }
 
