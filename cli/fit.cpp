@@ -125,6 +125,9 @@ void add_fit(CLI::App& app, Context& context) {
       verb->add_flag("--staged", settings.staged,
                      "Grow the fit lobe by lobe from a guess made from the table (default for dense measurements)");
   verb->add_flag("--not-staged", settings.not_staged, "Start from the model's defaults all the same")->excludes(staged);
+  verb->add_flag("--hops", settings.hops,
+                 "With --staged: let single lobes of the best start begin anew, out of valleys where one lobe plays "
+                 "another's part; several times the work");
   verb->add_option("--prior", settings.prior,
                    "With --staged: what the data leave open is pulled to neutral values; a parameter's whole width "
                    "costs the square of this share of the misfit")

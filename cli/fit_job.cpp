@@ -114,6 +114,7 @@ FitOptions options_of(const FitSettings& settings, const FitTable& table, const 
   options.starts = settings.starts.value_or(measured ? 6 : 1);
   options.most_entries = settings.directions.value_or(measured ? 50000 : 0);
   options.prior = settings.prior;
+  options.hops = settings.hops;
   // A measured BRDF is no closer to its fit than a few per cent: further digits are of no use.
   options.tolerance = options.staged ? 1e-3 : options.tolerance;
   options.holdout = settings.holdout;

@@ -21,7 +21,7 @@ struct FitSettings {
   double holdout = 0.0, prior = 0.05;
   int lobes = 2;
   int sphere = 64;  // pixels across the spheres of the metrics report
-  bool staged = false, not_staged = false, compare_tiers = false, figure = false;
+  bool staged = false, not_staged = false, compare_tiers = false, figure = false, hops = false;
 };
 
 /// A material: a file, or one of several in a file.

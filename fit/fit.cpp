@@ -9,6 +9,8 @@
 #include <numeric>
 #include <optional>
 
+#include "fit/hops.h"
+#include "fit/open_variables.h"
 #include "fit/sample_entries.h"
 #include "fit/starts.h"
 #include "fit/table_problem.h"
@@ -53,8 +55,7 @@ void keep_best_two(std::vector<Minimum>& minima, const FitVariables& variables) 
   const Minimum& best = minima.front();
   const auto other = std::ranges::find_if(minima, [&](const Minimum& minimum) {
     for (std::size_t v = 0; v < variables.names.size(); ++v) {
-      const double range = std::min(variables.upper[v] - variables.lower[v], 4.0);
-      if (std::abs(minimum.x[v] - best.x[v]) > 0.05 * range) return true;
+      if (std::abs(minimum.x[v] - best.x[v]) > 0.05 * variables.range(v)) return true;
     }
     return false;
   });
@@ -104,14 +105,21 @@ std::vector<Minimum> staged_minima(const Samples& samples, const ParameterValues
   std::ranges::stable_sort(minima, is_better);
   minima.resize(std::max<std::size_t>(std::min<std::size_t>(minima.size(), 2), minima.size() / 2));
   misfit = std::sqrt(minima.front().sum_of_squares);
-  tbb::parallel_for(std::size_t{0}, minima.size(), [&](std::size_t index) {
-    LeastSquaresProblem next = samples.fine_or_whole().with_prior(minima[index].x, options.prior * misfit);
+  const auto on_fine = [&](std::vector<double> start, int iterations, double tolerance) {
+    LeastSquaresProblem next = samples.fine_or_whole().with_prior(std::move(start), options.prior * misfit);
     keep_signs(next, samples.whole.variables());
-    next.maximum_iterations = 60;
-    next.tolerance = 1e-5;
-    minima[index] = minimise(next, monitor);
-  });
+    next.maximum_iterations = iterations;
+    next.tolerance = tolerance;
+    return minimise(next, monitor);
+  };
+  tbb::parallel_for(std::size_t{0}, minima.size(),
+                    [&](std::size_t index) { minima[index] = on_fine(minima[index].x, 60, 1e-5); });
   std::ranges::stable_sort(minima, is_better);
+  if (options.hops) {
+    misfit = std::sqrt(minima.front().sum_of_squares);
+    minima.insert(minima.begin(), hop(samples.whole.variables(), values, minima.front(), options.seed,
+                                      [&](std::vector<double> start) { return on_fine(std::move(start), 20, 1e-3); }));
+  }
   misfit = std::sqrt(minima.front().sum_of_squares);
   return minima;
 }
@@ -355,8 +363,12 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
   monitor.begin("fit " + result.model, static_cast<std::uint64_t>(result.starts_tried));
   const Minimum best = search(samples, values, table, options, monitor);
   monitor.end();
-  const LeastSquaresProblem whole = problem.problem(best.x, samples.fine ? &*samples.fine : nullptr);
-  const LeastSquaresSolution solution = analyse(whole, best);
+  // Where a misfit makes the intervals, a sample knows the curvature well enough; where noise does, the sample's own
+  // would count.
+  const bool sampled = samples.fine && options.intervals == Intervals::blocks;
+  const LeastSquaresProblem whole = problem.problem(best.x, sampled ? &*samples.fine : nullptr);
+  LeastSquaresSolution solution = analyse(whole, best);
+  mark_open_variables(samples.fine_or_whole(), best.x, solution);
 
   const ParameterValues fitted = problem.values_at(best.x);
   const TableModel on_table(model, fitted, table, options.mappings);

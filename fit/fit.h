@@ -44,6 +44,7 @@ struct FitOptions {
   double loss_scale = 0.05;
   int starts = 1;       // > 1: further starts from a scrambled Sobol sequence
   bool staged = false;  // starts grow from a closed-form guess, lobe by lobe: see fit/starts.h
+  bool hops = false;    // staged: lobes of the best start begin anew, see fit/hops.h; several times the work
   /// Starts run on a stratified sample of so many entries, the best two go on over all.
   std::size_t start_entries = 2000;
   /// Of staged fits: pulls what the data leave open to where the model is neutral; moving a parameter over its whole

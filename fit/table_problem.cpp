@@ -82,10 +82,8 @@ FitVariables make_variables(const ParameterValues& values, const TableModel& on_
         variables.lower.push_back(bounds.lower);
         variables.upper.push_back(bounds.upper);
         variables.start.push_back(scale * values.flat()[slot]);
-        // An intensity's range is far wider than what it is used for.
-        const double width = std::min(bounds.upper - bounds.lower, 4.0);
         variables.neutral.push_back(is_tint ? values.info(product->intensity).initial : info.initial);
-        variables.width.push_back(has_prior(info) ? width : 0.0);
+        variables.width.push_back(has_prior(info) ? variables.range(variables.lower.size() - 1) : 0.0);
         variables.channel.push_back(per_channel ? c : -1);
       }
       variables.variable_of_slot[slot] = static_cast<int>(variables.names.size()) - 1;

@@ -3,6 +3,7 @@
 // Residuals are √(weight) (quantity(model) - quantity(table)), weights summing to 1.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string>
@@ -43,6 +44,9 @@ struct FitVariables {
   std::vector<int> variable_of_slot;   // -1: not driven
   std::vector<std::size_t> intensity;  // of each product: the slot of its intensity, 1 while its tint is driven
   std::vector<std::size_t> tint;       // of each product: the first slot of its tint
+
+  /// How much of a variable's range is used: an intensity's is far wider than that.
+  double range(std::size_t v) const { return std::min(upper[v] - lower[v], 4.0); }
 };
 
 /// The unordered pair of ranges, a ninth of the quarter circle each, that two polar angles fall into: reciprocal twins
