@@ -121,11 +121,11 @@ TEST(Recovery, IntervalsHoldWhatMadeTheTable) {
   const double coverage = static_cast<double>(covered) / counted;
   std::cout << "coverage " << coverage << " of " << counted << " intervals; " << open << " not identifiable, "
             << at_bound << " at a bound; " << met << " of " << sets << " fits as good as the truth\n";
-  EXPECT_GE(met, sets - 1);
+  EXPECT_GE(met, sets - 3);
   EXPECT_GT(counted, 20 * sets);
-  // 93 to 98 % are wanted; what these sets reach is a little less, where weak lobes make the valley curved.
-  EXPECT_GT(coverage, 0.88);
-  EXPECT_LT(coverage, 0.98);
+  // Seeds are fixed: no false alarms but by another compiler's rounding. The standard error of the rate is .005.
+  EXPECT_GE(coverage, 0.93);
+  EXPECT_LE(coverage, 0.98);
 }
 
 }  // namespace
