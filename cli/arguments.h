@@ -32,6 +32,7 @@ struct Context {
 // One function per verb: adds it to the program; it runs through CLI11's callback.
 void add_models(CLI::App& app, Context& context);
 void add_eval(CLI::App& app, Context& context);
+void add_sample(CLI::App& app, Context& context);
 void add_albedo(CLI::App& app, Context& context);
 void add_albedo_table(CLI::App& app, Context& context);
 void add_references(CLI::App& app, Context& context);

@@ -87,6 +87,7 @@ int run(int argc, char** argv) {
   app.add_flag("--force", context.force, "Replace existing output");
   add_models(app, context);
   add_eval(app, context);
+  add_sample(app, context);
   add_albedo(app, context);
   add_albedo_table(app, context);
   add_references(app, context);
