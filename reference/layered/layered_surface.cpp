@@ -625,22 +625,4 @@ std::unique_ptr<const Integrator> make_layered(const LayerStack& stack) {
   return std::make_unique<LayeredSurface>(stack);
 }
 
-Reference layered_reference() {
-  return {.name = "layered",
-          .doc = "Plane-parallel interfaces and media over a diffuse or metallic bottom, all orders of scattering.",
-          .source = "Guo, Hašan, Zhao 2018, Position-Free Monte Carlo Simulation for Arbitrary Layered BSDFs",
-          .parameters = {{.name = "stack",
-                          .doc = "Layer stack, a JSON file (data/schemas/stack.json).",
-                          .file = true,
-                          .components = 0}},
-          .make = [](const ParameterValues& values) {
-            const std::string path = values.path("stack");
-            if (path.empty()) {
-              throw Error(ExitCode::usage, "no layer stack was given", "layered, parameter stack",
-                          "name one: stack=FILE");
-            }
-            return make_layered(LayerStack::read(path));
-          }};
-}
-
 }  // namespace lobefit

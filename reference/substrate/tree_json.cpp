@@ -1,0 +1,342 @@
+#include "reference/substrate/tree_json.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "models/substrate/conversions.h"
+
+namespace lobefit {
+
+namespace {
+
+double number_between(const JsonReader& reader, double lower, double upper) {
+  const double value = reader.number();
+  if (!(value >= lower && value <= upper)) {
+    throw reader.error(fmt::format("{} is out of range", value),
+                       fmt::format("choose a number from {} to {}", lower, upper));
+  }
+  return value;
+}
+
+Rgb rgb_between(const JsonReader& reader, double lower, double upper) {
+  if (!reader.value().is_array()) {
+    const double value = number_between(reader, lower, upper);
+    return {value, value, value};
+  }
+  const std::vector<JsonReader> elements = reader.elements();
+  if (elements.size() != 3) throw reader.error("expected one number or three", "write a number or [r, g, b]");
+  return {number_between(elements[0], lower, upper), number_between(elements[1], lower, upper),
+          number_between(elements[2], lower, upper)};
+}
+
+/// A slab's names: its parameters, and those of the helper nodes.
+std::vector<std::string> slab_keys() {
+  std::vector<std::string> keys{"name",     "ior",           "base_color", "metallic",
+                                "specular", "transmittance", "haziness",   "haze_extent"};
+  for (const ParameterInfo& info : describe_parameters<Slab>()) keys.emplace_back(info.name);
+  return keys;
+}
+
+void refuse_together(const JsonReader& reader, const char* helper, std::initializer_list<const char*> others) {
+  if (!reader.has(helper)) return;
+  for (const char* other : others) {
+    if (reader.has(other)) {
+      throw reader.error(fmt::format("'{}' and '{}' together", helper, other), "keep one: both set the same thing");
+    }
+  }
+}
+
+SlabValues read_slab_values(const JsonReader& reader) {
+  SlabValues slab = default_slab();
+  Slab::describe(slab, [&](auto& member, const ParameterInfo& info) {
+    if (!reader.has(info.name)) return;
+    const JsonReader value = reader.at(info.name);
+    const double upper = info.name == "mean_free_path" ? longest_mean_free_path : info.upper;
+    if constexpr (is_vector<std::remove_cvref_t<decltype(member)>>) {
+      member = rgb_between(value, info.lower, upper);
+    } else if (!info.choices.empty()) {
+      const std::string name = value.text();
+      const auto found = std::find(info.choices.begin(), info.choices.end(), name);
+      if (found == info.choices.end()) {
+        throw value.error("unknown choice '" + name + "'", fmt::format("write {}", fmt::join(info.choices, ", ")));
+      }
+      member = static_cast<double>(found - info.choices.begin());
+    } else {
+      member = number_between(value, info.lower, upper);
+    }
+  });
+  return slab;
+}
+
+TreeNode read_slab(const JsonReader& reader) {
+  static const std::vector<std::string> keys = slab_keys();
+  for (const auto& [key, member] : reader.members()) {
+    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      throw reader.error("unknown key '" + key + "'", "did you mean '" + nearest_name(key, keys) + "'?");
+    }
+  }
+  refuse_together(reader, "ior", {"f0", "base_color"});
+  refuse_together(reader, "base_color", {"f0", "diffuse_albedo"});
+  refuse_together(reader, "transmittance", {"mean_free_path"});
+  refuse_together(reader, "haziness", {"second_roughness", "second_roughness_weight"});
+
+  TreeNode node{.slab = read_slab_values(reader), .path = reader.path()};
+  SlabValues& slab = node.slab;
+  if (reader.has("name")) node.name = reader.at("name").text();
+  if (reader.has("ior")) {
+    const double f0 = f0_of_index(number_between(reader.at("ior"), 1.0, 100.0));
+    slab.f0 = {f0, f0, f0};
+  }
+  if (reader.has("base_color")) {
+    const double metallic = reader.has("metallic") ? number_between(reader.at("metallic"), 0.0, 1.0) : 0.0;
+    const double specular = reader.has("specular") ? number_between(reader.at("specular"), 0.0, 1.0) : 0.5;
+    set_metalness(slab, rgb_between(reader.at("base_color"), 0.0, 1.0), metallic, specular);
+  } else if (reader.has("metallic") || reader.has("specular")) {
+    throw reader.error("metallic and specular without base_color", "add base_color, or write diffuse_albedo and f0");
+  }
+  if (reader.has("transmittance")) {
+    slab.mean_free_path = mean_free_path_of(rgb_between(reader.at("transmittance"), 0.0, 1.0), slab.thickness);
+  }
+  if (reader.has("haziness")) {
+    const double extent = reader.has("haze_extent") ? number_between(reader.at("haze_extent"), 0.0, 20.0) : 3.0;
+    set_haziness(slab, number_between(reader.at("haziness"), 0.0, 1.0), extent);
+  } else if (reader.has("haze_extent")) {
+    throw reader.error("haze_extent without haziness", "add haziness");
+  }
+  return node;
+}
+
+/// Reads nodes, those of "nodes" once each.
+class TreeReader {
+ public:
+  SlabTree tree;
+
+  explicit TreeReader(const JsonReader& document) {
+    if (document.has("nodes")) {
+      for (const auto& [name, member] : document.at("nodes").members()) named_.emplace(name, member);
+    }
+  }
+
+  int read(const JsonReader& reader) {
+    if (reader.value().is_string()) return read_name(reader);
+    // The document itself carries more than its node.
+    std::vector<std::pair<std::string, JsonReader>> kinds;
+    for (const auto& [key, member] : reader.members()) {
+      if (reader.path() == "$" && (key == "$schema" || key == "title" || key == "description" || key == "thin" ||
+                                   key == "nodes" || key == "root")) {
+        continue;
+      }
+      kinds.emplace_back(key, member);
+    }
+    if (reader.path() == "$" && reader.has("root")) {
+      if (!kinds.empty()) throw reader.error("'root' beside a node", "move the node into root, or into nodes");
+      return read(reader.at("root"));
+    }
+    static const std::vector<std::string> known{"slab", "vertical", "horizontal", "coverage", "select", "unreal"};
+    if (kinds.size() != 1) {
+      throw reader.error(fmt::format("expected one of {}, got {} of them", fmt::join(known, ", "), kinds.size()),
+                         "write {\"slab\": { … }} or an operator");
+    }
+    const auto& [kind, member] = kinds.front();
+    if (kind == "slab") return add(read_slab(member), member);
+    if (kind == "vertical") return read_vertical(member);
+    if (kind == "horizontal") return read_pair(member, Operator::horizontal, "background", "foreground", "mix");
+    if (kind == "select") return read_pair(member, Operator::select, "a", "b", "mask");
+    if (kind == "coverage") {
+      member.allow({"operand", "weight"});
+      const int operand = read_operand(member, "operand");
+      return add(
+          {.kind = Operator::coverage, .first = operand, .amount = number_between(member.at("weight"), 0.0, 1.0)},
+          member);
+    }
+    if (kind == "unreal") return read_unreal(member);
+    throw reader.error("unknown key '" + kind + "'", "did you mean '" + nearest_name(kind, known) + "'?");
+  }
+
+ private:
+  int add(TreeNode node, const JsonReader& reader) {
+    node.path = reader.path();
+    return tree.add(std::move(node));
+  }
+
+  int read_operand(const JsonReader& reader, const char* key) {
+    if (!reader.has(key) || reader.at(key).value().is_null()) {
+      throw reader.error(fmt::format("missing operand '{}'", key), "every operator needs something to work on");
+    }
+    return read(reader.at(key));
+  }
+
+  int read_vertical(const JsonReader& reader) {
+    reader.allow({"top", "bottom", "thickness"});
+    const int top = read_operand(reader, "top");
+    if (!reader.has("bottom") || reader.at("bottom").value().is_null()) {
+      throw reader.error("a vertical operator over nothing", "add 'bottom', or leave the operator out");
+    }
+    const int bottom = read(reader.at("bottom"));
+    const double thickness = reader.has("thickness") ? number_between(reader.at("thickness"), 0.0, 1e6) : -1.0;
+    return add({.kind = Operator::vertical, .first = top, .second = bottom, .amount = thickness}, reader);
+  }
+
+  int read_pair(const JsonReader& reader, Operator kind, const char* first, const char* second, const char* amount) {
+    reader.allow({first, second, amount});
+    const int a = read_operand(reader, first), b = read_operand(reader, second);
+    return add({.kind = kind, .first = a, .second = b, .amount = number_between(reader.at(amount), 0.0, 1.0)}, reader);
+  }
+
+  int read_unreal(const JsonReader& reader) {
+    const std::string model = reader.at("model").text();
+    const auto share = [&](const char* key, double initial) {
+      return reader.has(key) ? number_between(reader.at(key), 0.0, 1.0) : initial;
+    };
+    const auto color = [&](const char* key, double initial) {
+      return reader.has(key) ? rgb_between(reader.at(key), 0.0, 1.0) : Rgb{initial, initial, initial};
+    };
+    const std::size_t before = tree.nodes.size();
+    int index = -1;
+    if (model == "default_lit" || model == "clear_coat") {
+      if (model == "default_lit") {
+        reader.allow({"model", "base_color", "metallic", "specular", "roughness", "anisotropy"});
+      } else {
+        reader.allow(
+            {"model", "base_color", "metallic", "specular", "roughness", "clear_coat", "clear_coat_roughness"});
+      }
+      const double anisotropy = reader.has("anisotropy") ? number_between(reader.at("anisotropy"), -1.0, 1.0) : 0.0;
+      index = add_default_lit(tree, color("base_color", 0.5), share("metallic", 0.0), share("specular", 0.5),
+                              share("roughness", 0.5), anisotropy);
+      if (model == "clear_coat") {
+        index = add_clear_coat(tree, index, share("clear_coat", 1.0), share("clear_coat_roughness", 0.1));
+      }
+    } else if (model == "cloth") {
+      reader.allow({"model", "base_color", "specular", "roughness", "cloth", "fuzz_color"});
+      index = add_cloth(tree, color("base_color", 0.5), share("specular", 0.5), share("roughness", 0.5),
+                        share("cloth", 1.0), color("fuzz_color", 0.5));
+    } else {
+      throw reader.at("model").error("no slabs are known for '" + model + "'",
+                                     "choose default_lit, clear_coat or cloth");
+    }
+    for (std::size_t i = before; i < tree.nodes.size(); ++i) tree.nodes[i].path = reader.path();
+    return index;
+  }
+
+  int read_name(const JsonReader& reader) {
+    const std::string name = reader.text();
+    const auto found = named_.find(name);
+    if (found == named_.end()) {
+      std::vector<std::string> names;
+      for (const auto& [known, ignored] : named_) names.push_back(known);
+      throw reader.error("no node is named '" + name + "'",
+                         names.empty() ? "add it to \"nodes\"" : "did you mean '" + nearest_name(name, names) + "'?");
+    }
+    if (const auto done = finished_.find(name); done != finished_.end()) return done->second;
+    if (std::find(open_.begin(), open_.end(), name) != open_.end()) {
+      open_.push_back(name);
+      throw reader.error(fmt::format("a cycle: {}", fmt::join(open_, " → ")), "a node can't contain itself");
+    }
+    open_.push_back(name);
+    const int index = read(found->second);
+    open_.pop_back();
+    finished_.emplace(name, index);
+    return index;
+  }
+
+  std::map<std::string, JsonReader> named_;
+  std::map<std::string, int> finished_;
+  std::vector<std::string> open_;
+};
+
+}  // namespace
+
+SlabTree tree_from_json(const JsonReader& reader) {
+  TreeReader nodes(reader);
+  if (reader.has("thin")) nodes.tree.thin = reader.at("thin").boolean();
+  nodes.tree.root = nodes.read(reader);
+  // Counted before shared nodes are copied: a few dozen lines can name 2^30 of them.
+  std::vector<double> slabs(nodes.tree.nodes.size());
+  for (std::size_t i = 0; i < slabs.size(); ++i) {
+    const TreeNode& node = nodes.tree.nodes[i];
+    const auto of = [&](int operand) { return operand < 0 ? 0.0 : slabs[static_cast<std::size_t>(operand)]; };
+    if (node.kind == Operator::slab) {
+      slabs[i] = 1.0;
+    } else if (node.kind == Operator::select) {
+      slabs[i] = of(node.amount < 0.5 ? node.first : node.second);
+    } else {
+      slabs[i] = of(node.first) + of(node.second);
+    }
+  }
+  const double count = slabs[static_cast<std::size_t>(nodes.tree.root)];
+  if (count > static_cast<double>(most_closures)) {
+    throw reader.error(fmt::format("{} slabs, and at most {} closures are supported", count, most_closures),
+                       "merge or leave out some");
+  }
+  return nodes.tree;
+}
+
+SlabTree read_tree(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (!file.good() && !file.eof()) {
+    throw Error(ExitCode::invalid_input, "cannot read the Substrate tree", path, "check the path");
+  }
+  const Json json = parse_json(text, path);
+  return tree_from_json(JsonReader(json, path));
+}
+
+Json slab_json(const SlabValues& slab) {
+  SlabValues given = slab;
+  Json json = Json::object();
+  Slab::describe(given, [&](auto& member, const ParameterInfo& info) {
+    const std::string name(info.name);
+    if constexpr (is_vector<std::remove_cvref_t<decltype(member)>>) {
+      if (member.x != info.initial || member.y != info.initial || member.z != info.initial) {
+        json[name] = {member.x, member.y, member.z};
+      }
+    } else if (member != info.initial) {
+      if (info.choices.empty()) {
+        json[name] = member;
+      } else {
+        json[name] = info.choices[static_cast<std::size_t>(member)];
+      }
+    }
+  });
+  return json;
+}
+
+namespace {
+
+Json node_json(const SlabTree& tree, int index) {
+  const TreeNode& node = tree.node(index);
+  const auto operand = [&](int number) { return node_json(tree, number); };
+  switch (node.kind) {
+    case Operator::slab: {
+      Json slab = Json::object();
+      if (!node.name.empty()) slab["name"] = node.name;
+      slab.update(slab_json(node.slab));
+      return {{"slab", slab}};
+    }
+    case Operator::vertical: {
+      Json vertical{{"top", operand(node.first)}, {"bottom", operand(node.second)}};
+      if (node.amount >= 0.0) vertical["thickness"] = node.amount;
+      return {{"vertical", vertical}};
+    }
+    case Operator::horizontal:
+      return {{"horizontal",
+               {{"background", operand(node.first)}, {"foreground", operand(node.second)}, {"mix", node.amount}}}};
+    case Operator::coverage: return {{"coverage", {{"operand", operand(node.first)}, {"weight", node.amount}}}};
+    case Operator::select:
+      return {{"select", {{"a", operand(node.first)}, {"b", operand(node.second)}, {"mask", node.amount}}}};
+  }
+  return {};
+}
+
+}  // namespace
+
+Json tree_json(const SlabTree& tree) {
+  Json json = node_json(tree, tree.root);
+  if (tree.thin) json["thin"] = true;
+  return json;
+}
+
+}  // namespace lobefit
