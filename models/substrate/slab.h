@@ -174,13 +174,19 @@ struct Slab {
 
   template <class T, class G>
   LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>& g) {
-    return evaluate_over(p, g,
-                         choose(
-                             p.diffuse_model, [&] { return diffuse<0>(p, g); }, [&] { return diffuse<1>(p, g); },
-                             [&] { return diffuse<2>(p, g); }));
+    Vec3<T> opaque = choose(
+        p.diffuse_model, [&] { return diffuse<0>(p, g); }, [&] { return diffuse<1>(p, g); },
+        [&] { return diffuse<2>(p, g); });
+    if constexpr (is_traced<T>) {
+      return evaluate_over(p, g, with_medium(p, g, opaque));
+    } else {
+      // The medium is most of the work, and few slabs have one.
+      return evaluate_over(p, g, has_medium(p) ? with_medium(p, g, opaque) : opaque);
+    }
   }
 
-  static constexpr int variant_count = static_cast<int>(slab_diffuse_choices.size());
+  /// The diffuse models, each without a medium and with one.
+  static constexpr int variant_count = 2 * static_cast<int>(slab_diffuse_choices.size());
   template <int variant>
   struct Variant {
     static constexpr ModelInfo info = Slab::info;
@@ -189,12 +195,15 @@ struct Slab {
 
     template <class T, class G>
     LOBEFIT_TEXT static Vec3<T> evaluate(const Slab::Parameters<T>& p, const Geometry<G>& g) {
-      return evaluate_over(p, g, diffuse<variant>(p, g));
+      Vec3<T> body = diffuse<variant / 2>(p, g);
+      if constexpr (variant % 2 == 1) body = with_medium(p, g, body);
+      return evaluate_over(p, g, body);
     }
   };
   template <class Slot>
   static int variant(std::span<const Slot> flat) {
-    return choice_number(flat.back(), variant_count);
+    const Parameters<double> p = unflatten<Slab, double, Slot>(flat);
+    return 2 * choice_number(flat.back(), static_cast<int>(slab_diffuse_choices.size())) + (has_medium(p) ? 1 : 0);
   }
 
   /// Directional albedo of the interface with both lobes, fuzz left out.
@@ -245,8 +254,24 @@ struct Slab {
     }
   }
 
+  template <class T>
+  static bool has_medium(const Parameters<T>& p) {
+    return p.mean_free_path.x > 0.0 || p.mean_free_path.y > 0.0 || p.mean_free_path.z > 0.0;
+  }
+
+  /// Per channel the medium's scattering where the mean free path is not 0.
   template <class T, class G>
-  LOBEFIT_TEXT static Vec3<T> evaluate_over(const Parameters<T>& p, const Geometry<G>& g, const Vec3<T>& opaque) {
+  LOBEFIT_TEXT static Vec3<T> with_medium(const Parameters<T>& p, const Geometry<G>& g, const Vec3<T>& opaque) {
+    Vec3<T> depth = let("depth", p.thickness / max(p.mean_free_path, 1e-9));
+    Vec3<T> scattering = let("scattering", single_scattering_albedo(p.diffuse_albedo, p.phase_anisotropy));
+    Vec3<T> thin = let("thin", thin_scattering(scattering, depth, p.phase_anisotropy, g));
+    return let("body", Vec3<T>{select(p.mean_free_path.x > 0.0, thin.x, opaque.x),
+                               select(p.mean_free_path.y > 0.0, thin.y, opaque.y),
+                               select(p.mean_free_path.z > 0.0, thin.z, opaque.z)});
+  }
+
+  template <class T, class G>
+  LOBEFIT_TEXT static Vec3<T> evaluate_over(const Parameters<T>& p, const Geometry<G>& g, const Vec3<T>& body) {
     // The interface.
     Vec3<T> f90 = let("f90", call<SlabGrazingReflectance>(p.f0, p.f90));
     const T lobe = let("lobe", ggx_lobe(KullaContyAnisotropy::evaluate(T(square(p.roughness)), p.anisotropy), g));
@@ -257,15 +282,6 @@ struct Slab {
     Vec3<T> specular = let(
         "specular", fresnel * lerp(lobe, second, p.second_roughness_weight) * turquin_scale(p.f0, T(1.0 - albedo.all)));
     Vec3<T> specular_albedo = let("specular_albedo", albedo.specular(p.f0, f90));
-
-    // The medium.
-    Vec3<T> clear = let("clear", max(p.mean_free_path, 1e-9));
-    Vec3<T> depth = let("depth", p.thickness / clear);
-    Vec3<T> scattering = let("scattering", single_scattering_albedo(p.diffuse_albedo, p.phase_anisotropy));
-    Vec3<T> thin = let("thin", thin_scattering(scattering, depth, p.phase_anisotropy, g));
-    Vec3<T> body = let("body", Vec3<T>{select(p.mean_free_path.x > 0.0, thin.x, opaque.x),
-                                       select(p.mean_free_path.y > 0.0, thin.y, opaque.y),
-                                       select(p.mean_free_path.z > 0.0, thin.z, opaque.z)});
 
     const T fuzz_albedo = let("fuzz_albedo", p.fuzz_amount * call<ZeltnerFit::Albedo>(g.cos_theta_o, p.fuzz_roughness));
     Vec3<T> fuzz = let("fuzz", SheenZeltner::evaluate(SheenZeltner::Parameters<T>{p.fuzz_color, p.fuzz_roughness}, g));

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "models/substrate/slab.h"
+#include "models/substrate/storage.h"
 
 namespace lobefit {
 
@@ -25,9 +25,6 @@ struct TreeNode {
   std::string name;  // of a slab, for people
   std::string path;  // where it came from, as errors and reports name it
 };
-
-/// Closures at most, as the engine's own limit is 8.
-inline constexpr std::size_t most_closures = 8;
 
 /// A material: nodes in any order.
 struct SlabTree {

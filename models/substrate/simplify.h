@@ -1,0 +1,344 @@
+// Collapsing a tree, operator by operator, until it fits (S2, slides 57-62).
+#pragma once
+
+#include <functional>
+
+#include "models/substrate/blend.h"
+#include "models/substrate/storage.h"
+#include "models/substrate/walk.h"
+
+namespace lobefit {
+
+/// How two slabs become one. fitted_haze keeps two lobes where they differ, for 4 bytes.
+enum class BlendRule { baseline, fitted, fitted_haze };
+inline constexpr std::array<std::string_view, 3> blend_rule_names{"baseline", "fitted", "fitted_haze"};
+
+inline SlabValues blend_horizontal(const SlabValues& background, const SlabValues& foreground, double mix,
+                                   BlendRule rule, const FittedBlend::Constants<double>& constants) {
+  switch (rule) {
+    case BlendRule::baseline: return BaselineBlend::horizontal(background, foreground, mix);
+    case BlendRule::fitted: return FittedBlend::horizontal(background, foreground, mix, constants);
+    default: return FittedBlend::horizontal<true>(background, foreground, mix, constants);
+  }
+}
+inline SlabValues blend_vertical(const SlabValues& top, const SlabValues& bottom, BlendRule rule,
+                                 const FittedBlend::Constants<double>& constants) {
+  switch (rule) {
+    case BlendRule::baseline: return BaselineBlend::vertical(top, bottom);
+    case BlendRule::fitted: return FittedBlend::vertical(top, bottom, constants);
+    default: return FittedBlend::vertical<true>(top, bottom, constants);
+  }
+}
+
+/// A slab that covers a share of the surface.
+struct PartialSlab {
+  SlabValues slab{};
+  double coverage = 1.0;
+};
+
+/// A mix in the proportion of what is there.
+inline PartialSlab blend_horizontal(const PartialSlab& background, const PartialSlab& foreground, double mix,
+                                    BlendRule rule, const FittedBlend::Constants<double>& constants) {
+  const double a = (1.0 - mix) * background.coverage, b = mix * foreground.coverage;
+  if (b <= 0.0) return {background.slab, a};
+  if (a <= 0.0) return {foreground.slab, b};
+  return {blend_horizontal(background.slab, foreground.slab, b / (a + b), rule, constants), a + b};
+}
+/// Layers by the three outcomes that show anything, mixed in proportion: both, the top alone, the bottom alone.
+inline PartialSlab blend_vertical(const PartialSlab& top, const PartialSlab& bottom, BlendRule rule,
+                                  const FittedBlend::Constants<double>& constants) {
+  const double t = top.coverage, b = bottom.coverage;
+  PartialSlab result{bottom.slab, (1.0 - t) * b};
+  const auto add = [&](const SlabValues& slab, double weight) {
+    if (weight <= 0.0) return;
+    const double sum = result.coverage + weight;
+    result = {result.coverage > 0.0 ? blend_horizontal(result.slab, slab, weight / sum, rule, constants) : slab, sum};
+  };
+  add(blend_vertical(top.slab, bottom.slab, rule, constants), t * b);
+  add(top.slab, t * (1.0 - b));
+  return result;
+}
+
+// ---- collapsing one operator ---------------------------------------------------------------------------------------
+
+/// A resolved tree whose slabs keep their thicknesses, whatever is collapsed above them.
+inline SlabTree collapsible(const SlabTree& given) {
+  SlabTree tree = resolved(given);
+  for (TreeNode& node : tree.nodes) {
+    if (node.kind == Operator::vertical) node.amount = -1.0;
+  }
+  return tree;
+}
+
+/// The slab at a node, through coverages; null slab (index -1) where there are operators below.
+struct SlabUnderCoverage {
+  int slab = -1;
+  double coverage = 1.0;
+
+  static SlabUnderCoverage of(const SlabTree& tree, int index) {
+    SlabUnderCoverage result;
+    for (int i = index;;) {
+      const TreeNode& node = tree.node(i);
+      if (node.kind == Operator::slab) {
+        result.slab = i;
+        return result;
+      }
+      if (node.kind != Operator::coverage) return result;
+      result.coverage *= node.amount;
+      i = node.first;
+    }
+  }
+};
+
+/// Mixes and layers whose operands are slabs, in the order of the nodes: what can be collapsed next.
+inline std::vector<int> collapsible_operators(const SlabTree& tree) {
+  std::vector<int> result;
+  const std::function<void(int)> visit = [&](int index) {
+    const TreeNode& node = tree.node(index);
+    if (node.kind == Operator::slab) return;
+    if (node.kind == Operator::coverage) return visit(node.first);
+    if (SlabUnderCoverage::of(tree, node.first).slab >= 0 && SlabUnderCoverage::of(tree, node.second).slab >= 0) {
+      result.push_back(index);
+      return;
+    }
+    visit(node.first);
+    visit(node.second);
+  };
+  visit(tree.root);
+  return result;
+}
+
+/// Operators from the root down to a node.
+inline int depth_of(const SlabTree& tree, int target) {
+  const std::function<int(int, int)> find = [&](int index, int depth) {
+    if (index == target) return depth;
+    const TreeNode& node = tree.node(index);
+    if (node.kind == Operator::slab) return -1;
+    const int first = find(node.first, depth + 1);
+    return first >= 0 || node.second < 0 ? first : find(node.second, depth + 1);
+  };
+  return find(tree.root, 0);
+}
+
+/// The tree with one operator of collapsible_operators() made a slab, in a coverage where it is not whole.
+inline SlabTree collapsed(SlabTree tree, int index, BlendRule rule, const FittedBlend::Constants<double>& constants) {
+  const TreeNode node = tree.node(index);
+  const auto operand = [&](int number) {
+    const SlabUnderCoverage found = SlabUnderCoverage::of(tree, number);
+    return PartialSlab{tree.node(found.slab).slab, found.coverage};
+  };
+  const PartialSlab merged =
+      node.kind == Operator::horizontal
+          ? blend_horizontal(operand(node.first), operand(node.second), node.amount, rule, constants)
+          : blend_vertical(operand(node.first), operand(node.second), rule, constants);
+  const auto name = [&](int number) {
+    const TreeNode& slab = tree.node(SlabUnderCoverage::of(tree, number).slab);
+    return slab.name.empty() ? slab.path : slab.name;
+  };
+  TreeNode slab{.kind = Operator::slab,
+                .slab = merged.slab,
+                .name = name(node.first) + (node.kind == Operator::horizontal ? "|" : "/") + name(node.second),
+                .path = node.path};
+  if (merged.coverage >= 1.0 - 1e-12) {
+    tree.node(index) = std::move(slab);
+  } else {
+    const int added = tree.add(std::move(slab));
+    tree.node(index) = {.kind = Operator::coverage, .first = added, .amount = merged.coverage, .path = node.path};
+  }
+  return tree;
+}
+
+// ---- features ------------------------------------------------------------------------------------------------------
+
+/// What collapsing gives up last, in this order: by bytes saved, and by how little most materials show it.
+enum class SlabFeature { glints, f90, anisotropy, second_lobe, fuzz };
+inline constexpr std::array<std::string_view, 5> slab_feature_names{"glints", "f90", "anisotropy", "second_lobe",
+                                                                    "fuzz"};
+
+inline bool has_feature(const SlabValues& slab, SlabFeature feature) {
+  const ClosureFeatures features = features_of(slab);
+  switch (feature) {
+    case SlabFeature::glints: return features.glints;
+    case SlabFeature::f90: return features.f90;
+    case SlabFeature::anisotropy: return features.anisotropy;
+    case SlabFeature::second_lobe: return features.second_lobe;
+    default: return features.fuzz;
+  }
+}
+
+/// Without a feature: glints become their far field, the lobe; two lobes one of their mean variance; fibres what they
+/// send back on the average, as diffuse albedo.
+inline SlabValues without_feature(SlabValues slab, SlabFeature feature) {
+  switch (feature) {
+    case SlabFeature::glints: slab.glint_density = 0.0; break;
+    case SlabFeature::f90: slab.f90 = {1.0, 1.0, 1.0}; break;
+    case SlabFeature::anisotropy: slab.anisotropy = 0.0; break;
+    case SlabFeature::second_lobe:
+      slab.roughness = std::sqrt(
+          alpha_of_variance(lerp(lobe_variance(square(slab.roughness)), lobe_variance(square(slab.second_roughness)),
+                                 slab.second_roughness_weight)));
+      slab.second_roughness_weight = 0.0;
+      break;
+    case SlabFeature::fuzz: {
+      // 2 ∫ R μ dμ by four midpoints: R is smooth.
+      double albedo = 0.0;
+      for (const double mu2 : {0.125, 0.375, 0.625, 0.875}) {
+        albedo += 0.25 * ZeltnerFit::Albedo::evaluate(std::sqrt(mu2), slab.fuzz_roughness);
+      }
+      const double share = slab.fuzz_amount * albedo;
+      slab.diffuse_albedo = at_most(slab.diffuse_albedo * (1.0 - share) + slab.fuzz_color * share, 1.0);
+      slab.fuzz_amount = 0.0;
+    }
+  }
+  return slab;
+}
+
+/// Turns a feature off in every slab that is reached; false where none had it.
+inline bool drop_feature(SlabTree& tree, SlabFeature feature) {
+  bool any = false;
+  const std::function<void(int)> visit = [&](int index) {
+    TreeNode& node = tree.node(index);
+    if (node.kind != Operator::slab) {
+      visit(node.first);
+      if (node.second >= 0) visit(node.second);
+    } else if (has_feature(node.slab, feature)) {
+      node.slab = without_feature(node.slab, feature);
+      any = true;
+    }
+  };
+  visit(tree.root);
+  return any;
+}
+
+// ---- bytes ---------------------------------------------------------------------------------------------------------
+
+/// What a pixel has to store of a walk's closures. A layer that doesn't scatter needs no medium of its own: what it
+/// takes from light is stored with those below it.
+inline std::vector<ClosureFeatures> stored_features(const std::vector<Closure>& closures) {
+  std::vector<ClosureFeatures> result;
+  for (const Closure& closure : closures) {
+    ClosureFeatures features = features_of(closure.slab);
+    features.medium = features.medium && features.diffuse;
+    features.below = !closure.above.empty();
+    features.throughput = features.below || closure.weight < 1.0;
+    result.push_back(features);
+  }
+  return result;
+}
+
+inline int tree_bytes(const std::vector<Closure>& closures) {
+  // An empty pixel has a header all the same.
+  return closures.empty() ? 4 : material_bytes(stored_features(closures));
+}
+
+// ---- strategies ----------------------------------------------------------------------------------------------------
+
+/// One tree on the way from the full one to a single plain slab.
+struct SimplifiedTree {
+  SlabTree tree;
+  int bytes = 0;
+  std::size_t closures = 0;
+  std::vector<std::string> steps;  // "collapse $.vertical (fitted)", "drop fuzz": all so far
+  double error = 0.0;              // by whoever asked
+};
+
+inline SimplifiedTree measured(SlabTree tree, std::vector<std::string> steps) {
+  const std::vector<Closure> closures = walk(tree);
+  SimplifiedTree result{.tree = std::move(tree), .steps = std::move(steps)};
+  result.bytes = tree_bytes(closures);
+  result.closures = closures.size();
+  return result;
+}
+
+inline std::string collapse_step(const SlabTree& tree, int index, BlendRule rule) {
+  const std::string& path = tree.node(index).path;
+  return "collapse " +
+         (path.empty() ? std::string(operator_names[static_cast<std::size_t>(tree.node(index).kind)]) : path) + " (" +
+         std::string(blend_rule_names[static_cast<std::size_t>(rule)]) + ")";
+}
+
+/// Substrate's order: the deepest operator first, then features off. The full tree first, the plainest last.
+inline std::vector<SimplifiedTree> simplify_deepest_first(const SlabTree& given, BlendRule rule,
+                                                          const FittedBlend::Constants<double>& constants) {
+  std::vector<SimplifiedTree> levels{measured(collapsible(given), {})};
+  for (;;) {
+    const SimplifiedTree& last = levels.back();
+    const std::vector<int> candidates = collapsible_operators(last.tree);
+    if (candidates.empty()) break;
+    const int chosen = *std::max_element(candidates.begin(), candidates.end(),
+                                         [&](int a, int b) { return depth_of(last.tree, a) < depth_of(last.tree, b); });
+    std::vector<std::string> steps = last.steps;
+    steps.push_back(collapse_step(last.tree, chosen, rule));
+    levels.push_back(measured(collapsed(last.tree, chosen, rule, constants), std::move(steps)));
+  }
+  for (std::size_t feature = 0; feature < slab_feature_names.size(); ++feature) {
+    SlabTree tree = levels.back().tree;
+    if (!drop_feature(tree, static_cast<SlabFeature>(feature))) continue;
+    std::vector<std::string> steps = levels.back().steps;
+    steps.push_back("drop " + std::string(slab_feature_names[feature]));
+    levels.push_back(measured(std::move(tree), std::move(steps)));
+  }
+  return levels;
+}
+
+/// The least error for every number of bytes: orders of collapsing, rules at every operator and features off are
+/// searched together, keeping the `beam` best trees of each number of steps. What Substrate's order gives, with any one
+/// rule, is among the candidates. From most bytes to fewest, errors rising.
+inline std::vector<SimplifiedTree> simplify_by_error(const SlabTree& given,
+                                                     const FittedBlend::Constants<double>& constants,
+                                                     const std::function<double(const SlabTree&)>& error,
+                                                     std::size_t beam = 12) {
+  std::vector<SimplifiedTree> all;
+  const auto judged = [&](SimplifiedTree tree) {
+    tree.error = error(tree.tree);
+    all.push_back(tree);
+    return tree;
+  };
+  for (const BlendRule rule : {BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze}) {
+    for (SimplifiedTree& level : simplify_deepest_first(given, rule, constants)) judged(std::move(level));
+  }
+  std::vector<SimplifiedTree> front{measured(collapsible(given), {})};
+  while (!front.empty()) {
+    std::vector<SimplifiedTree> next;
+    for (const SimplifiedTree& from : front) {
+      const auto step = [&](SlabTree tree, std::string words) {
+        std::vector<std::string> steps = from.steps;
+        steps.push_back(std::move(words));
+        next.push_back(judged(measured(std::move(tree), std::move(steps))));
+      };
+      for (const int index : collapsible_operators(from.tree)) {
+        for (const BlendRule rule : {BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze}) {
+          step(collapsed(from.tree, index, rule, constants), collapse_step(from.tree, index, rule));
+        }
+      }
+      for (std::size_t feature = 0; feature < slab_feature_names.size(); ++feature) {
+        SlabTree tree = from.tree;
+        if (drop_feature(tree, static_cast<SlabFeature>(feature))) {
+          step(std::move(tree), "drop " + std::string(slab_feature_names[feature]));
+        }
+      }
+    }
+    // Few bytes and small errors both matter: the best of each size go on first.
+    std::stable_sort(next.begin(), next.end(),
+                     [](const SimplifiedTree& a, const SimplifiedTree& b) { return a.error < b.error; });
+    front.clear();
+    for (SimplifiedTree& candidate : next) {
+      if (front.size() >= beam) break;
+      const bool known = std::any_of(front.begin(), front.end(), [&](const SimplifiedTree& kept) {
+        return kept.bytes == candidate.bytes && kept.error == candidate.error;
+      });
+      if (!known) front.push_back(std::move(candidate));
+    }
+  }
+  std::stable_sort(all.begin(), all.end(), [](const SimplifiedTree& a, const SimplifiedTree& b) {
+    return a.bytes != b.bytes ? a.bytes < b.bytes : a.error < b.error;
+  });
+  std::vector<SimplifiedTree> best;
+  for (SimplifiedTree& candidate : all) {
+    if (best.empty() || candidate.error < best.back().error) best.push_back(std::move(candidate));
+  }
+  std::reverse(best.begin(), best.end());
+  return best;
+}
+
+}  // namespace lobefit
