@@ -14,10 +14,9 @@ namespace lobefit {
 
 namespace {
 
-constexpr int constant_count = 13;
+constexpr int constant_count = 19;
 static_assert(sizeof(RuleConstants) == constant_count * sizeof(double));
-using RuleDual = Dual<16>;
-static_assert(constant_count <= 16);
+using RuleDual = Dual<constant_count>;
 
 double value_of(double x) { return x; }
 double value_of(const RuleDual& x) { return x.value; }
@@ -67,7 +66,7 @@ struct Directions {
   }
 };
 
-/// BRDF of an opaque slab. One copy of it: with sixteen derivatives, inlined everywhere, it compiles for minutes.
+/// BRDF of an opaque slab. One copy of it: with that many derivatives, inlined everywhere, it compiles for minutes.
 template <class T>
 [[gnu::noinline]] Vec3<T> opaque_brdf(const Slab::Parameters<T>& slab, const Direction& wi, const Direction& wo) {
   const Geometry<double> geometry = make_geometry(wi, wo);
@@ -76,6 +75,18 @@ template <class T>
     case 1: return Slab::Variant<2>::evaluate(slab, geometry);
     default: return Slab::Variant<4>::evaluate(slab, geometry);
   }
+}
+
+template <bool haze, class T>
+[[gnu::noinline]] Slab::Parameters<T> layered_slab(const Slab::Parameters<T>& top, const Slab::Parameters<T>& bottom,
+                                                   double cos_theta_o, const FittedBlend::Constants<T>& c) {
+  return FittedBlend::vertical<haze>(top, bottom, cos_theta_o, c);
+}
+template <bool haze, class T>
+[[gnu::noinline]] Slab::Parameters<T> mixed_slab(const Slab::Parameters<T>& background,
+                                                 const Slab::Parameters<T>& foreground, const T& mix,
+                                                 double cos_theta_o, const FittedBlend::Constants<T>& c) {
+  return FittedBlend::horizontal<haze>(background, foreground, mix, cos_theta_o, c);
 }
 
 /// Directional albedo of an opaque slab: the interface by its table, the body by quadrature.
@@ -156,13 +167,16 @@ class RuleProblem {
   template <bool haze, class T>
   void layer_residuals(std::size_t number, const FittedBlend::Constants<T>& c, T*& out) const {
     const LayeredPair& pair = pairs_.layers[number];
-    const Slab::Parameters<T> slab =
-        FittedBlend::vertical<haze, T>(promoted<T>(prepared(pair.top)), promoted<T>(prepared(pair.bottom)), c);
+    const Slab::Parameters<T> top = promoted<T>(prepared(pair.top)), bottom = promoted<T>(prepared(pair.bottom));
+    std::vector<Slab::Parameters<T>> slabs;
+    for (const Direction& wo : Directions::get().views) {
+      slabs.push_back(layered_slab<haze, T>(top, bottom, wo.z, c));
+    }
     const Directions& directions = Directions::get();
     const std::size_t views = directions.views.size(), lights = directions.lights.size();
     const double weight = std::sqrt((1.0 - options_.brdf_weight) / static_cast<double>(3 * views));
     for (std::size_t v = 0; v < views; ++v) {
-      const Vec3<T> albedo = slab_albedo(slab, directions.views[v]);
+      const Vec3<T> albedo = slab_albedo(slabs[v], directions.views[v]);
       const std::size_t entry = number * views + v;
       const auto one = [&](const T& model, float truth) {
         const double reference = std::max(static_cast<double>(truth), 1e-3);
@@ -185,7 +199,7 @@ class RuleProblem {
         }
         const std::size_t entry = (number * views + v) * lights + l;
         const Rgb truth{pairs_.brdf.value(entry, 0), pairs_.brdf.value(entry, 1), pairs_.brdf.value(entry, 2)};
-        compare(opaque_brdf<T>(slab, wi, wo), truth, wi.z, brdf_weight, out);
+        compare(opaque_brdf<T>(slabs[v], wi, wo), truth, wi.z, brdf_weight, out);
       }
     }
   }
@@ -194,11 +208,11 @@ class RuleProblem {
   void mix_residuals(std::size_t number, const FittedBlend::Constants<T>& c, T*& out) const {
     const MixedPair& pair = pairs_.mixes[number];
     const SlabValues background = prepared(pair.background), foreground = prepared(pair.foreground);
-    const Slab::Parameters<T> slab =
-        FittedBlend::horizontal<haze, T>(promoted<T>(background), promoted<T>(foreground), T(pair.mix), c);
+    const Slab::Parameters<T> a = promoted<T>(background), b = promoted<T>(foreground);
     const Directions& directions = Directions::get();
     const double weight = std::sqrt(1.0 / static_cast<double>(3 * directions.views.size() * directions.lights.size()));
     for (const Direction& wo : directions.views) {
+      const Slab::Parameters<T> slab = mixed_slab<haze, T>(a, b, T(pair.mix), wo.z, c);
       for (const Direction& wi : directions.lights) {
         const Rgb truth =
             lerp(opaque_brdf<double>(background, wi, wo), opaque_brdf<double>(foreground, wi, wo), pair.mix);
@@ -304,12 +318,12 @@ std::vector<RuleScore> score_rules(const RulePairs& pairs, const RuleConstants& 
   tbb::parallel_for(std::size_t{0}, pairs.layers.size(), [&](std::size_t i) {
     LayeredPair pair = pairs.layers[i];
     pair.top.diffuse_model = pair.bottom.diffuse_model = options.diffuse_model;
-    const SlabValues slabs[] = {BaselineBlend::vertical(pair.top, pair.bottom),
-                                FittedBlend::vertical(pair.top, pair.bottom, constants),
-                                FittedBlend::vertical<true>(pair.top, pair.bottom, constants)};
     const std::vector<Closure> closures = walk(pair.tree());
     for (std::size_t v = 0; v < views; ++v) {
       const Direction& wo = directions.views[v];
+      const SlabValues slabs[] = {BaselineBlend::vertical(pair.top, pair.bottom),
+                                  layered_slab<false, double>(pair.top, pair.bottom, wo.z, constants),
+                                  layered_slab<true, double>(pair.top, pair.bottom, wo.z, constants)};
       const Rgb shown[ways] = {slab_albedo(slabs[0], wo), directional_albedo(closures, wo), slab_albedo(slabs[1], wo),
                                slab_albedo(slabs[2], wo)};
       for (int way = 0; way < ways; ++way) {
@@ -351,20 +365,20 @@ MixScore score_mixes(const RulePairs& pairs, const RuleConstants& constants, con
   for (const MixedPair& drawn : pairs.mixes) {
     MixedPair pair = drawn;
     pair.background.diffuse_model = pair.foreground.diffuse_model = options.diffuse_model;
-    const SlabValues slabs[] = {BaselineBlend::horizontal(pair.background, pair.foreground, pair.mix),
-                                FittedBlend::horizontal(pair.background, pair.foreground, pair.mix, constants),
-                                FittedBlend::horizontal<true>(pair.background, pair.foreground, pair.mix, constants)};
     for (std::size_t way = 0; way < 3; ++way) {
       double sum = 0.0;
       std::size_t count = 0;
       for (const Direction& wo : directions.views) {
+        const SlabValues &a = pair.background, &b = pair.foreground;
+        const SlabValues slab = way == 0   ? BaselineBlend::horizontal(a, b, pair.mix)
+                                : way == 1 ? mixed_slab<false, double>(a, b, pair.mix, wo.z, constants)
+                                           : mixed_slab<true, double>(a, b, pair.mix, wo.z, constants);
         for (const Direction& wi : directions.lights) {
-          const Rgb truth = lerp(opaque_brdf<double>(pair.background, wi, wo),
-                                 opaque_brdf<double>(pair.foreground, wi, wo), pair.mix);
-          const Rgb shown = opaque_brdf<double>(slabs[way], wi, wo);
-          const auto add = [&](double a, double b) {
+          const Rgb truth = lerp(opaque_brdf<double>(a, wi, wo), opaque_brdf<double>(b, wi, wo), pair.mix);
+          const Rgb shown = opaque_brdf<double>(slab, wi, wo);
+          const auto add = [&](double model, double reference) {
             const auto value = [&](double f) { return std::log1p(log_scale * wi.z * std::max(f, 0.0)); };
-            sum += square(value(a) - value(b));
+            sum += square(value(model) - value(reference));
             ++count;
           };
           add(shown.x, truth.x), add(shown.y, truth.y), add(shown.z, truth.z);

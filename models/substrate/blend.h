@@ -145,75 +145,99 @@ struct TwoStreams {
   }
 };
 
-/// What a compensated lobe of this f0 reflects on the whole, E (f0 + f0² (1 - E)/E), and the f0 that gives a
-/// reflectance.
+/// The f0 with which a compensated lobe, E and E times Schlick's mean weight at the view being `albedo`'s, reflects
+/// `specular`: (f0 (E - G) + G)(1 + f0 (1 - E)/E) solved for f0, f90 being 1.
 template <class T>
-LOBEFIT_TEXT Vec3<T> with_further_bounces(const Vec3<T>& f0, const T& albedo) {
-  return f0 * (albedo + f0 * (1.0 - albedo));
-}
-template <class T>
-LOBEFIT_TEXT Vec3<T> without_further_bounces(const Vec3<T>& reflectance, const T& albedo) {
-  return each_channel(reflectance, [&](const T& r) {
-    return T(2.0 * r / (albedo + sqrt(albedo * albedo + 4.0 * (1.0 - albedo) * r)));
+LOBEFIT_TEXT Vec3<T> f0_of_albedo(const Vec3<T>& specular, const LobeAlbedo<T>& albedo) {
+  const T lost = let("lost_ratio", (1.0 - albedo.all) / albedo.all);
+  const T a = let("quadratic_a", (albedo.all - albedo.grazing) * lost);
+  const T b = let("quadratic_b", albedo.all - albedo.grazing + albedo.grazing * lost);
+  return each_channel(specular, [&](const T& r) {
+    const T rest = max(r - albedo.grazing, 0.0);
+    const T solution = 2.0 * rest / (b + sqrt(b * b + 4.0 * a * rest));
+    // Below f0 = .02 grazing reflection fades out (SlabGrazingReflectance): there f0 stands for the whole of it.
+    const T faded = 0.02 * saturate(r / (albedo.grazing + 0.02 * (albedo.all - albedo.grazing)));
+    return T(min(max(solution, faded), 1.0));
   });
 }
 
-/// Closed forms with fitted constants.
+/// Closed forms with fitted constants, at a view: a material is shaded where the view is known, so that what is stored
+/// may depend on it, as the walk's throughputs do. Where no view is known (a ray's payload) take mean_view.
 ///
-/// Vertical, per channel, with n the index of the top's mean F0, τ its depth, ω its single-scattering albedo:
+/// Vertical, per channel, with n the index of the top's mean F0, τ its depth, ω its single-scattering albedo, v =
+/// 1/μ' the path of the view inside it, over the thickness:
 ///
-///   ρ̂ = ρ/((1 - F_b) + F_b ρ)                         the bottom's body under an interface of its own, F_b
+///   ρ_b = ρ/((1 - F_b) + F_b ρ)                        the bottom's body under an interface of its own, F_b
+///   ρ̂ = (1 - F_d)(1 - F_u) ρ_b/(1 - F_u ρ_b) + F_d     and under that between the two slabs, from above and below
 ///   R(p) = R_km + T_km² ρ'/(1 - R_km ρ')               through the medium (Kubelka-Munk), K = p (1 - ω')τ', S = s ω'
 ///   τ',
 ///                                                      τ' = τ (1 - ω g), ω' = ω (1 - g)/(1 - ω g); ρ' = ρ̂ + F_r
-///   ρ_out = (1 - F_i) R(p_out)/(1 - F_i R(p_inside))   Saunderson: F_i what the top's interface sends back inside
-///   F_out = (1 - F_t)(1 - F_x) F_r T²/(1 - F_x F_r T²) the bottom's lobe through the top
+///   body = (1 - E_t)(1 - F_i) R(p)/(1 - F_i R(p_in))    Saunderson: F_i what the top sends back inside;
+///                                                      p from (v + p_l)/2 where it absorbs to p_m where it scatters
+///   lobe = (1 - E_t)(1 - F_x) F_r T/(1 - F_x F_r T)    the bottom's through the top, T = exp(-τ (v + p)), p from v to
+///                                                      p_s with both alphas; F_x from F_t to F_i with them
 ///
-/// and the lobes' alphas meet in a power mean weighted by their light, or stay apart as two lobes. F_r is the bottom's
-/// reflectance seen from inside the top: of two dielectrics, that of their relative index.
+/// E_t is the top's albedo at the view; F_r the bottom's reflectance seen from inside the top: of two dielectrics, that
+/// of their relative index. The slab gets the f0 and the diffuse albedo with which it returns E_t + lobe and body at
+/// this view; the lobes' alphas meet in a power mean weighted by their light, or stay apart as two lobes.
 struct FittedBlend {
   template <class T>
   struct Constants {
-    T path_out, path_inside, scattering, forward, rough_interior, trapping, top_trapping, stretch, blur, layer_power,
-        mix_power, body_gain, body_gain_slope;
+    T light_path, lobe_path, milky_path, inside_path, scattering, rough_interior, rough_fresnel, trapping, top_trapping,
+        stretch, blur, layer_power, mix_power, gain, gain_roughness, gain_roughness2, grazing_gain,
+        grazing_gain_roughness, grazing_gain_roughness2;
   };
 
   /// Names, starting values (what smooth optics or plain averaging would have) and bounds.
   template <class C, class Visit>
   static constexpr void describe(C& c, Visit&& visit) {
-    visit(c.path_out,
-          ParameterInfo{.name = "path_out",
-                        .symbol = "p_out",
+    visit(c.light_path,
+          ParameterInfo{.name = "light_path",
+                        .symbol = "p_l",
                         .lower = 0.5,
                         .upper = 3.0,
-                        .initial = 1.1,
-                        .doc = "Path through the medium of light that leaves, over the thickness, one way"});
-    visit(c.path_inside, ParameterInfo{.name = "path_inside",
-                                       .symbol = "p_in",
-                                       .lower = 0.5,
-                                       .upper = 5.0,
-                                       .initial = 1.8,
-                                       .doc = "the same of light that the interface sends back inside"});
+                        .initial = 1.2,
+                        .doc = "path through the medium of light that comes to a body, over the thickness"});
+    visit(c.lobe_path, ParameterInfo{.name = "lobe_path",
+                                     .symbol = "p_s",
+                                     .lower = 0.5,
+                                     .upper = 5.0,
+                                     .initial = 1.2,
+                                     .doc = "the same of light on its way to a rough bottom's lobe"});
+    visit(c.milky_path, ParameterInfo{.name = "milky_path",
+                                      .symbol = "p_m",
+                                      .lower = 0.5,
+                                      .upper = 5.0,
+                                      .initial = 1.5,
+                                      .doc = "the same, one way, of all light in a medium that only scatters"});
+    visit(c.inside_path,
+          ParameterInfo{.name = "inside_path",
+                        .symbol = "p_in",
+                        .lower = 0.5,
+                        .upper = 5.0,
+                        .initial = 1.8,
+                        .doc = "path of light that the interface sends back inside, over the thickness, one way"});
     visit(c.scattering, ParameterInfo{.name = "scattering",
                                       .symbol = "s",
                                       .lower = 0.05,
                                       .upper = 3.0,
                                       .initial = 0.75,
                                       .doc = "Kubelka and Munk's S over ω' τ'"});
-    visit(c.forward, ParameterInfo{.name = "forward",
-                                   .symbol = "w",
-                                   .lower = 0.0,
-                                   .upper = 1.0,
-                                   .initial = 0.0,
-                                   .doc = "share of scattered light that stays in the bottom's lobe"});
     visit(c.rough_interior, ParameterInfo{.name = "rough_interior",
                                           .symbol = "q",
                                           .lower = -1.0,
                                           .upper = 1.0,
                                           .initial = 0.0,
                                           .doc = "loss of F_i with the top's alpha"});
+    visit(c.rough_fresnel,
+          ParameterInfo{.name = "rough_fresnel",
+                        .symbol = "k",
+                        .lower = 0.0,
+                        .upper = 50.0,
+                        .initial = 3.0,
+                        .doc = "how fast the exact Fresnel term's excess over Schlick's is lost with the top's alpha"});
     visit(c.trapping, ParameterInfo{.name = "trapping",
-                                    .symbol = "h",
+                                    .symbol = "h_b",
                                     .lower = 0.0,
                                     .upper = 20.0,
                                     .initial = 2.0,
@@ -248,18 +272,42 @@ struct FittedBlend {
                                      .upper = 3.0,
                                      .initial = 1.0,
                                      .doc = "power of the mean of two mixed alphas"});
-    visit(c.body_gain, ParameterInfo{.name = "body_gain",
-                                     .symbol = "G_0",
-                                     .lower = 0.8,
-                                     .upper = 1.3,
-                                     .initial = 1.0,
-                                     .doc = "what the collapsed body's diffuse model must be given, at roughness 0"});
-    visit(c.body_gain_slope, ParameterInfo{.name = "body_gain_slope",
-                                           .symbol = "G_1",
-                                           .lower = -0.5,
-                                           .upper = 0.5,
+    visit(c.gain, ParameterInfo{.name = "gain",
+                                .symbol = "G_0",
+                                .lower = -3.0,
+                                .upper = 3.0,
+                                .initial = 0.0,
+                                .doc = "what the diffuse model must be given for what it loses"});
+    visit(c.gain_roughness, ParameterInfo{.name = "gain_roughness",
+                                          .symbol = "G_1",
+                                          .lower = -3.0,
+                                          .upper = 3.0,
+                                          .initial = 0.0,
+                                          .doc = "and times roughness"});
+    visit(c.gain_roughness2, ParameterInfo{.name = "gain_roughness2",
+                                           .symbol = "G_2",
+                                           .lower = -3.0,
+                                           .upper = 3.0,
                                            .initial = 0.0,
-                                           .doc = "and its slope over roughness"});
+                                           .doc = "and times roughness²"});
+    visit(c.grazing_gain, ParameterInfo{.name = "grazing_gain",
+                                        .symbol = "H_0",
+                                        .lower = -3.0,
+                                        .upper = 3.0,
+                                        .initial = 0.0,
+                                        .doc = "the same over (1 - μ)²"});
+    visit(c.grazing_gain_roughness, ParameterInfo{.name = "grazing_gain_roughness",
+                                                  .symbol = "H_1",
+                                                  .lower = -3.0,
+                                                  .upper = 3.0,
+                                                  .initial = 0.0,
+                                                  .doc = "and times roughness"});
+    visit(c.grazing_gain_roughness2, ParameterInfo{.name = "grazing_gain_roughness2",
+                                                   .symbol = "H_2",
+                                                   .lower = -3.0,
+                                                   .upper = 3.0,
+                                                   .initial = 0.0,
+                                                   .doc = "and times roughness²"});
   }
 
   static Constants<double> initial() {
@@ -286,27 +334,47 @@ struct FittedBlend {
     }
   }
 
-  /// The slab's body is seen through 1 - F0 of the mixture, where each had its own: undone here.
-  template <bool haze = false, class T>
+  /// The slab that returns this light at the view, its lobes being set already.
+  template <class T, class G>
+  LOBEFIT_TEXT static void set_light(Slab::Parameters<T>& result, const Vec3<T>& specular, const Vec3<T>& body,
+                                     const G& cos_theta_o, const Constants<T>& c) {
+    const LobeAlbedo<T> albedo = Slab::lobes_albedo(result, cos_theta_o);
+    result.f0 = f0_of_albedo(specular, albedo);
+    Vec3<T> left = 1.0 - Slab::specular_albedo(result, cos_theta_o);
+    const T r = result.roughness;
+    const T grazing = let("grazing", square(T(1.0 - cos_theta_o)));
+    const T gain =
+        let("gain", 1.0 + c.gain + r * (c.gain_roughness + r * c.gain_roughness2) +
+                        grazing * (c.grazing_gain + r * (c.grazing_gain_roughness + r * c.grazing_gain_roughness2)));
+    result.diffuse_albedo = at_most(body * gain / max(left, 0.02), 1.0);
+  }
+
+  template <bool haze = false, class T, class G>
   LOBEFIT_TEXT static Slab::Parameters<T> horizontal(const Slab::Parameters<T>& background,
                                                      const Slab::Parameters<T>& foreground, const T& mix,
-                                                     const Constants<T>& c) {
+                                                     const G& cos_theta_o, const Constants<T>& c) {
     Slab::Parameters<T> result = lerp_slabs(background, foreground, mix);
+    Vec3<T> specular_a = Slab::specular_albedo(background, cos_theta_o);
+    Vec3<T> specular_b = Slab::specular_albedo(foreground, cos_theta_o);
     Vec3<T> body =
-        lerp(background.diffuse_albedo * (1.0 - background.f0), foreground.diffuse_albedo * (1.0 - foreground.f0), mix);
-    result.diffuse_albedo = at_most(body / max(1.0 - result.f0, 0.02), 1.0);
-    const T light_a = let("light_a", (1.0 - mix) * mean_of_channels(background.f0));
-    const T light_b = let("light_b", mix * mean_of_channels(foreground.f0));
+        lerp(background.diffuse_albedo * (1.0 - specular_a), foreground.diffuse_albedo * (1.0 - specular_b), mix);
+    const T light_a = let("light_a", (1.0 - mix) * mean_of_channels(specular_a));
+    const T light_b = let("light_b", mix * mean_of_channels(specular_b));
     const T share = let("share_b", light_b / max(light_a + light_b, 1e-9));
     result.f90 = lerp(background.f90, foreground.f90, share);
     result.anisotropy = lerp(background.anisotropy, foreground.anisotropy, share);
     merge_lobes<haze>(result, slab_alpha(background), light_a, slab_alpha(foreground), light_b, c.mix_power);
+    // Both bodies lose the same to their diffuse model: no gain.
+    Constants<T> neutral = c;
+    neutral.gain = neutral.gain_roughness = neutral.gain_roughness2 = T(0.0);
+    neutral.grazing_gain = neutral.grazing_gain_roughness = neutral.grazing_gain_roughness2 = T(0.0);
+    set_light(result, lerp(specular_a, specular_b, mix), body, cos_theta_o, neutral);
     return result;
   }
 
-  template <bool haze = false, class T>
+  template <bool haze = false, class T, class G>
   LOBEFIT_TEXT static Slab::Parameters<T> vertical(const Slab::Parameters<T>& top, const Slab::Parameters<T>& bottom,
-                                                   const Constants<T>& c) {
+                                                   const G& cos_theta_o, const Constants<T>& c) {
     const auto index_of = [](const T& f0) {
       const T root = sqrt(min(f0, 0.9));
       return T((1.0 + root) / (1.0 - root));
@@ -316,52 +384,72 @@ struct FittedBlend {
     const T n = let("n", index_of(f0));
     const T metal = let("metal", saturate((bottom_f0 - 0.08) / 0.12));
     const T bottom_n = let("bottom_n", index_of(T(bottom_f0 * (1.0 - metal))));
-    const T alpha = let("alpha", slab_alpha(top)), bottom_alpha = let("bottom_alpha", slab_alpha(bottom));
+    const T alpha = let("alpha", slab_alpha(top));
+    const T bottom_alpha = let("bottom_alpha", slab_alpha(bottom));
 
     // What the bottom is from inside the top.
     const T own_inside = let("own_inside", diffuse_fresnel_inside(bottom_n));
-    const T inside = let("inside", diffuse_fresnel_inside(T(max(n, bottom_n))) * (1.0 - c.rough_interior * alpha));
-    const T relative = let("relative", square((bottom_n - n) / (bottom_n + n)));
-    // f0 = 0 is no interface, not one of index 1.
-    const T between = let("between", select(bottom_f0 > 0.0, relative, T(0.0)));
+    const T inside = let("inside", diffuse_fresnel_inside(n) * (1.0 - c.rough_interior * alpha));
+    // f0 = 0 is no interface, not one of index 1; a metal's has no index.
+    const T ratio = let("ratio", select(bottom_f0 * (1.0 - metal) > 1e-4, bottom_n / n, T(1.0)));
+    const T between = let("between", square((ratio - 1.0) / (ratio + 1.0)));
+    // Of diffuse light, at the interface between the two, from above and from below. Light that came into a denser top
+    // from outside, or out of the bottom, is never totally reflected there.
+    const T denser = let("denser", max(ratio, 1.0 / ratio));
+    const T thin_side = let("thin_side", diffuse_fresnel_outside(denser));
+    const T from_above = let("from_above", select(ratio > 1.0, thin_side, between));
+    const T from_below = let("from_below", select(ratio > 1.0, T(diffuse_fresnel_inside(denser)), thin_side));
     const T bottom_keeps = let("bottom_keeps", 1.0 - call<GgxAverageLoss>(bottom_alpha));
-    Vec3<T> reflectance = with_further_bounces(Vec3<T>(bottom.f0 * metal + between * (1.0 - metal)), bottom_keeps);
-    Vec3<T> body = bottom.diffuse_albedo / ((1.0 - own_inside) + own_inside * bottom.diffuse_albedo);
+    Vec3<T> reflectance = bottom.f0 * metal + between * (1.0 - metal);
+    reflectance = reflectance * (bottom_keeps + reflectance * (1.0 - bottom_keeps));
+    Vec3<T> bare = bottom.diffuse_albedo / ((1.0 - own_inside) + own_inside * bottom.diffuse_albedo);
+    Vec3<T> body = bare * ((1.0 - from_above) * (1.0 - from_below)) / (1.0 - bare * from_below) +
+                   max(from_above - between, 0.0) * (1.0 - metal);
 
     // The medium.
     Vec3<T> depth = slab_depth(top);
     Vec3<T> scattering = single_scattering_albedo(top.diffuse_albedo, top.phase_anisotropy);
+    const T sine2 = let("sine2", T(1.0 - square(cos_theta_o)) / square(n));
+    const T view_path = let("view_path", min(1.0 / sqrt(max(1.0 - sine2, 1e-3)), 8.0));
+    // Slabs have Schlick's Fresnel term, interfaces the real one.
+    const T schlick = let("schlick", call<SchlickFresnel>(cos_theta_o, f0, T(1.0)));
+    const T excess = let("excess", select(f0 > 1e-4, call<DielectricFresnel>(cos_theta_o, n) - schlick, T(0.0)));
+    Vec3<T> coat = Slab::specular_albedo(top, cos_theta_o) + excess * exp(-c.rough_fresnel * alpha);
+    const T crossed =
+        let("crossed", lerp(f0, inside, T(1.0 - exp(-(c.trapping * bottom_alpha + c.top_trapping * alpha)))));
+    const T lobe_path = let("lobe_path", lerp(view_path, c.lobe_path, T(saturate(bottom_alpha + alpha))));
     const auto through = [&](const T& tau, const T& omega, const T& albedo, const T& path) {
-      const T left = T(1.0 - omega * top.phase_anisotropy);
-      const T reduced = tau * left, reduced_omega = omega * (1.0 - top.phase_anisotropy) / max(left, 1e-6);
+      const T kept = T(1.0 - omega * top.phase_anisotropy);
+      const T reduced = tau * kept;
+      const T reduced_omega = omega * (1.0 - top.phase_anisotropy) / max(kept, 1e-6);
       return TwoStreams<T>::of(T(path * (1.0 - reduced_omega) * reduced), T(c.scattering * reduced_omega * reduced))
           .over(albedo);
     };
     const auto channel = [&](const T& tau, const T& omega, const T& albedo, const T& f, T& specular, T& diffuse) {
-      const T direct = exp(-2.0 * c.path_out * tau * (1.0 - c.forward * omega));
-      const T crossed = lerp(f0, inside, T(1.0 - exp(-(c.trapping * bottom_alpha + c.top_trapping * alpha))));
-      specular = (1.0 - f0) * (1.0 - crossed) * f * direct / (1.0 - min(crossed * f * direct, 0.9999));
+      const T direct = exp(-tau * (view_path + lobe_path));
+      specular = (1.0 - crossed) * f * direct / (1.0 - min(crossed * f * direct, 0.9999));
+      const T path = lerp(T(0.5 * (view_path + c.light_path)), c.milky_path, omega);
       const T both = min(albedo + f, 0.9999);
-      const T out = max(through(tau, omega, both, c.path_out) - f * direct, 0.0);
-      const T back = through(tau, omega, both, c.path_inside);
+      // Without scattering this is the body alone: the lobe went the same way.
+      const T lobe = f * lerp(T(exp(-2.0 * path * tau)), direct, omega);
+      const T out = max(through(tau, omega, both, path) - lobe, 0.0);
+      const T back = through(tau, omega, both, c.inside_path);
       diffuse = (1.0 - inside) * out / (1.0 - min(inside * back, 0.9999));
     };
     Vec3<T> specular, diffuse;
     channel(depth.x, scattering.x, body.x, reflectance.x, specular.x, diffuse.x);
     channel(depth.y, scattering.y, body.y, reflectance.y, specular.y, diffuse.y);
     channel(depth.z, scattering.z, body.z, reflectance.z, specular.z, diffuse.z);
+    specular = specular * (1.0 - coat);
 
+    const T light_top = let("light_top", mean_of_channels(coat));
     const T light = let("light", mean_of_channels(specular));
-    const T share = let("share", light / max(light + f0, 1e-6));
+    const T share = let("share", light / max(light + light_top, 1e-6));
     Slab::Parameters<T> result = lerp_slabs(top, bottom, share);
-    result.f90 = lerp(top.f90, bottom.f90, share);
-    const T wide = c.stretch * log(n);
-    const T blurred = sqrt(square(bottom_alpha * exp(wide)) + square(c.blur * (n - 1.0) * alpha));
-    merge_lobes<haze>(result, alpha, f0, T(min(blurred, 1.0)), light, c.layer_power);
-    const T keeps = let("keeps", 1.0 - call<GgxAverageLoss>(slab_alpha(result)));
-    result.f0 = without_further_bounces(at_most(top.f0 + specular, 1.0), keeps);
-    const T gain = let("gain", c.body_gain + c.body_gain_slope * result.roughness);
-    result.diffuse_albedo = at_most(diffuse * ((1.0 - f0) * gain) / max(1.0 - result.f0, 0.02), 1.0);
+    const T wide = let("wide", c.stretch * log(n));
+    const T blurred = let("blurred", sqrt(square(bottom_alpha * exp(wide)) + square(c.blur * (n - 1.0) * alpha)));
+    merge_lobes<haze>(result, alpha, light_top, T(min(blurred, 1.0)), light, c.layer_power);
+    set_light(result, coat + specular, diffuse * (1.0 - coat), cos_theta_o, c);
 
     // Fibres: those on top, or those that reach through a top without an interface.
     const T open = let("open", saturate(1.0 - 50.0 * f0) * exp(-2.0 * mean_of_channels(depth)));
@@ -377,6 +465,9 @@ struct FittedBlend {
     result.diffuse_model = bottom.diffuse_model;
     return result;
   }
+
+  /// The cosine of the view where no view is known: the mean over diffuse light.
+  static constexpr double mean_view = 2.0 / 3.0;
 };
 
 }  // namespace lobefit

@@ -9,24 +9,30 @@
 
 namespace lobefit {
 
-/// How two slabs become one. fitted_haze keeps two lobes where they differ, for 4 bytes.
+/// How two slabs become one, and for which view. fitted_haze keeps two lobes where they differ, for 4 bytes.
 enum class BlendRule { baseline, fitted, fitted_haze };
 inline constexpr std::array<std::string_view, 3> blend_rule_names{"baseline", "fitted", "fitted_haze"};
 
+/// What the fitted rules need: their constants, and the cosine of the view that the material is stored for.
+struct BlendSetting {
+  FittedBlend::Constants<double> constants = FittedBlend::initial();
+  double cos_theta_o = FittedBlend::mean_view;
+};
+
 inline SlabValues blend_horizontal(const SlabValues& background, const SlabValues& foreground, double mix,
-                                   BlendRule rule, const FittedBlend::Constants<double>& constants) {
+                                   BlendRule rule, const BlendSetting& at) {
   switch (rule) {
     case BlendRule::baseline: return BaselineBlend::horizontal(background, foreground, mix);
-    case BlendRule::fitted: return FittedBlend::horizontal(background, foreground, mix, constants);
-    default: return FittedBlend::horizontal<true>(background, foreground, mix, constants);
+    case BlendRule::fitted: return FittedBlend::horizontal(background, foreground, mix, at.cos_theta_o, at.constants);
+    default: return FittedBlend::horizontal<true>(background, foreground, mix, at.cos_theta_o, at.constants);
   }
 }
 inline SlabValues blend_vertical(const SlabValues& top, const SlabValues& bottom, BlendRule rule,
-                                 const FittedBlend::Constants<double>& constants) {
+                                 const BlendSetting& at) {
   switch (rule) {
     case BlendRule::baseline: return BaselineBlend::vertical(top, bottom);
-    case BlendRule::fitted: return FittedBlend::vertical(top, bottom, constants);
-    default: return FittedBlend::vertical<true>(top, bottom, constants);
+    case BlendRule::fitted: return FittedBlend::vertical(top, bottom, at.cos_theta_o, at.constants);
+    default: return FittedBlend::vertical<true>(top, bottom, at.cos_theta_o, at.constants);
   }
 }
 
@@ -38,23 +44,23 @@ struct PartialSlab {
 
 /// A mix in the proportion of what is there.
 inline PartialSlab blend_horizontal(const PartialSlab& background, const PartialSlab& foreground, double mix,
-                                    BlendRule rule, const FittedBlend::Constants<double>& constants) {
+                                    BlendRule rule, const BlendSetting& at) {
   const double a = (1.0 - mix) * background.coverage, b = mix * foreground.coverage;
   if (b <= 0.0) return {background.slab, a};
   if (a <= 0.0) return {foreground.slab, b};
-  return {blend_horizontal(background.slab, foreground.slab, b / (a + b), rule, constants), a + b};
+  return {blend_horizontal(background.slab, foreground.slab, b / (a + b), rule, at), a + b};
 }
 /// Layers by the three outcomes that show anything, mixed in proportion: both, the top alone, the bottom alone.
 inline PartialSlab blend_vertical(const PartialSlab& top, const PartialSlab& bottom, BlendRule rule,
-                                  const FittedBlend::Constants<double>& constants) {
+                                  const BlendSetting& at) {
   const double t = top.coverage, b = bottom.coverage;
   PartialSlab result{bottom.slab, (1.0 - t) * b};
   const auto add = [&](const SlabValues& slab, double weight) {
     if (weight <= 0.0) return;
     const double sum = result.coverage + weight;
-    result = {result.coverage > 0.0 ? blend_horizontal(result.slab, slab, weight / sum, rule, constants) : slab, sum};
+    result = {result.coverage > 0.0 ? blend_horizontal(result.slab, slab, weight / sum, rule, at) : slab, sum};
   };
-  add(blend_vertical(top.slab, bottom.slab, rule, constants), t * b);
+  add(blend_vertical(top.slab, bottom.slab, rule, at), t * b);
   add(top.slab, t * (1.0 - b));
   return result;
 }
@@ -121,16 +127,15 @@ inline int depth_of(const SlabTree& tree, int target) {
 }
 
 /// The tree with one operator of collapsible_operators() made a slab, in a coverage where it is not whole.
-inline SlabTree collapsed(SlabTree tree, int index, BlendRule rule, const FittedBlend::Constants<double>& constants) {
+inline SlabTree collapsed(SlabTree tree, int index, BlendRule rule, const BlendSetting& at) {
   const TreeNode node = tree.node(index);
   const auto operand = [&](int number) {
     const SlabUnderCoverage found = SlabUnderCoverage::of(tree, number);
     return PartialSlab{tree.node(found.slab).slab, found.coverage};
   };
-  const PartialSlab merged =
-      node.kind == Operator::horizontal
-          ? blend_horizontal(operand(node.first), operand(node.second), node.amount, rule, constants)
-          : blend_vertical(operand(node.first), operand(node.second), rule, constants);
+  const PartialSlab merged = node.kind == Operator::horizontal
+                                 ? blend_horizontal(operand(node.first), operand(node.second), node.amount, rule, at)
+                                 : blend_vertical(operand(node.first), operand(node.second), rule, at);
   const auto name = [&](int number) {
     const TreeNode& slab = tree.node(SlabUnderCoverage::of(tree, number).slab);
     return slab.name.empty() ? slab.path : slab.name;
@@ -233,52 +238,79 @@ inline int tree_bytes(const std::vector<Closure>& closures) {
 
 // ---- strategies ----------------------------------------------------------------------------------------------------
 
-/// One tree on the way from the full one to a single plain slab.
-struct SimplifiedTree {
-  SlabTree tree;
-  int bytes = 0;
-  std::size_t closures = 0;
-  std::vector<std::string> steps;  // "collapse $.vertical (fitted)", "drop fuzz": all so far
-  double error = 0.0;              // by whoever asked
+/// One step of simplifying: an operator collapsed by a rule, or a feature off.
+struct SimplifyStep {
+  int index = -1;  // of the operator in collapsible(tree); -1: a feature
+  BlendRule rule = BlendRule::baseline;
+  SlabFeature feature = SlabFeature::glints;
 };
 
-inline SimplifiedTree measured(SlabTree tree, std::vector<std::string> steps) {
-  const std::vector<Closure> closures = walk(tree);
-  SimplifiedTree result{.tree = std::move(tree), .steps = std::move(steps)};
-  result.bytes = tree_bytes(closures);
-  result.closures = closures.size();
-  return result;
+/// The tree after some steps, stored for a view.
+inline SlabTree simplified(const SlabTree& given, std::span<const SimplifyStep> steps, const BlendSetting& at) {
+  SlabTree tree = collapsible(given);
+  for (const SimplifyStep& step : steps) {
+    if (step.index >= 0) {
+      tree = collapsed(std::move(tree), step.index, step.rule, at);
+    } else {
+      drop_feature(tree, step.feature);
+    }
+  }
+  return tree;
 }
 
-inline std::string collapse_step(const SlabTree& tree, int index, BlendRule rule) {
-  const std::string& path = tree.node(index).path;
+/// "collapse $.vertical (fitted)", "drop fuzz".
+inline std::string step_text(const SlabTree& given, const SimplifyStep& step) {
+  if (step.index < 0) return "drop " + std::string(slab_feature_names[static_cast<std::size_t>(step.feature)]);
+  const SlabTree tree = collapsible(given);
+  const TreeNode& node = tree.node(step.index);
   return "collapse " +
-         (path.empty() ? std::string(operator_names[static_cast<std::size_t>(tree.node(index).kind)]) : path) + " (" +
-         std::string(blend_rule_names[static_cast<std::size_t>(rule)]) + ")";
+         (node.path.empty() ? std::string(operator_names[static_cast<std::size_t>(node.kind)]) : node.path) + " (" +
+         std::string(blend_rule_names[static_cast<std::size_t>(step.rule)]) + ")";
 }
+
+/// A stage on the way from the full tree to a single plain slab.
+struct SimplifiedTree {
+  std::vector<SimplifyStep> steps;
+  int bytes = 0;
+  std::size_t closures = 0;
+  double error = 0.0;  // by whoever asked
+};
+
+namespace detail {
+
+inline SimplifiedTree stage(const SlabTree& given, std::vector<SimplifyStep> steps,
+                            const FittedBlend::Constants<double>& constants) {
+  const std::vector<Closure> closures = walk(simplified(given, steps, {constants}));
+  return {std::move(steps), tree_bytes(closures), closures.size()};
+}
+
+inline std::vector<SimplifyStep> with_step(std::vector<SimplifyStep> steps, const SimplifyStep& step) {
+  steps.push_back(step);
+  return steps;
+}
+
+}  // namespace detail
 
 /// Substrate's order: the deepest operator first, then features off. The full tree first, the plainest last.
 inline std::vector<SimplifiedTree> simplify_deepest_first(const SlabTree& given, BlendRule rule,
                                                           const FittedBlend::Constants<double>& constants) {
-  std::vector<SimplifiedTree> levels{measured(collapsible(given), {})};
+  std::vector<SimplifiedTree> stages{detail::stage(given, {}, constants)};
   for (;;) {
-    const SimplifiedTree& last = levels.back();
-    const std::vector<int> candidates = collapsible_operators(last.tree);
+    const SlabTree tree = simplified(given, stages.back().steps, {constants});
+    const std::vector<int> candidates = collapsible_operators(tree);
     if (candidates.empty()) break;
-    const int chosen = *std::max_element(candidates.begin(), candidates.end(),
-                                         [&](int a, int b) { return depth_of(last.tree, a) < depth_of(last.tree, b); });
-    std::vector<std::string> steps = last.steps;
-    steps.push_back(collapse_step(last.tree, chosen, rule));
-    levels.push_back(measured(collapsed(last.tree, chosen, rule, constants), std::move(steps)));
+    const int deepest = *std::max_element(candidates.begin(), candidates.end(),
+                                          [&](int a, int b) { return depth_of(tree, a) < depth_of(tree, b); });
+    stages.push_back(
+        detail::stage(given, detail::with_step(stages.back().steps, {.index = deepest, .rule = rule}), constants));
   }
   for (std::size_t feature = 0; feature < slab_feature_names.size(); ++feature) {
-    SlabTree tree = levels.back().tree;
-    if (!drop_feature(tree, static_cast<SlabFeature>(feature))) continue;
-    std::vector<std::string> steps = levels.back().steps;
-    steps.push_back("drop " + std::string(slab_feature_names[feature]));
-    levels.push_back(measured(std::move(tree), std::move(steps)));
+    const SimplifyStep step{.feature = static_cast<SlabFeature>(feature)};
+    SlabTree tree = simplified(given, stages.back().steps, {constants});
+    if (!drop_feature(tree, step.feature)) continue;
+    stages.push_back(detail::stage(given, detail::with_step(stages.back().steps, step), constants));
   }
-  return levels;
+  return stages;
 }
 
 /// The least error for every number of bytes: orders of collapsing, rules at every operator and features off are
@@ -286,39 +318,35 @@ inline std::vector<SimplifiedTree> simplify_deepest_first(const SlabTree& given,
 /// rule, is among the candidates. From most bytes to fewest, errors rising.
 inline std::vector<SimplifiedTree> simplify_by_error(const SlabTree& given,
                                                      const FittedBlend::Constants<double>& constants,
-                                                     const std::function<double(const SlabTree&)>& error,
-                                                     std::size_t beam = 12) {
+                                                     const std::function<double(std::span<const SimplifyStep>)>& error,
+                                                     std::size_t beam = 8) {
+  constexpr std::array rules{BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze};
   std::vector<SimplifiedTree> all;
-  const auto judged = [&](SimplifiedTree tree) {
-    tree.error = error(tree.tree);
-    all.push_back(tree);
-    return tree;
+  const auto judge = [&](SimplifiedTree stage) {
+    stage.error = error(stage.steps);
+    all.push_back(stage);
+    return stage;
   };
-  for (const BlendRule rule : {BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze}) {
-    for (SimplifiedTree& level : simplify_deepest_first(given, rule, constants)) judged(std::move(level));
+  for (const BlendRule rule : rules) {
+    for (SimplifiedTree& stage : simplify_deepest_first(given, rule, constants)) judge(std::move(stage));
   }
-  std::vector<SimplifiedTree> front{measured(collapsible(given), {})};
+  std::vector<SimplifiedTree> front{detail::stage(given, {}, constants)};
   while (!front.empty()) {
     std::vector<SimplifiedTree> next;
     for (const SimplifiedTree& from : front) {
-      const auto step = [&](SlabTree tree, std::string words) {
-        std::vector<std::string> steps = from.steps;
-        steps.push_back(std::move(words));
-        next.push_back(judged(measured(std::move(tree), std::move(steps))));
+      const SlabTree tree = simplified(given, from.steps, {constants});
+      const auto take = [&](const SimplifyStep& step) {
+        next.push_back(judge(detail::stage(given, detail::with_step(from.steps, step), constants)));
       };
-      for (const int index : collapsible_operators(from.tree)) {
-        for (const BlendRule rule : {BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze}) {
-          step(collapsed(from.tree, index, rule, constants), collapse_step(from.tree, index, rule));
-        }
+      for (const int index : collapsible_operators(tree)) {
+        for (const BlendRule rule : rules) take({.index = index, .rule = rule});
       }
       for (std::size_t feature = 0; feature < slab_feature_names.size(); ++feature) {
-        SlabTree tree = from.tree;
-        if (drop_feature(tree, static_cast<SlabFeature>(feature))) {
-          step(std::move(tree), "drop " + std::string(slab_feature_names[feature]));
-        }
+        const SimplifyStep step{.feature = static_cast<SlabFeature>(feature)};
+        SlabTree without = tree;
+        if (drop_feature(without, step.feature)) take(step);
       }
     }
-    // Few bytes and small errors both matter: the best of each size go on first.
     std::stable_sort(next.begin(), next.end(),
                      [](const SimplifiedTree& a, const SimplifiedTree& b) { return a.error < b.error; });
     front.clear();

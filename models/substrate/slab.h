@@ -206,6 +206,13 @@ struct Slab {
     return 2 * choice_number(flat.back(), static_cast<int>(slab_diffuse_choices.size())) + (has_medium(p) ? 1 : 0);
   }
 
+  /// E and E times Schlick's mean weight of both lobes in their shares.
+  template <class T, class G>
+  LOBEFIT_TEXT static LobeAlbedo<T> lobes_albedo(const Parameters<T>& p, const G& cos_theta) {
+    return LobeAlbedo<T>::mix(LobeAlbedo<T>::of(cos_theta, T(square(p.roughness))),
+                              LobeAlbedo<T>::of(cos_theta, T(square(p.second_roughness))), p.second_roughness_weight);
+  }
+
   /// Directional albedo of the interface with both lobes, fuzz left out.
   template <class T, class G>
   LOBEFIT_TEXT static Vec3<T> specular_albedo(const Parameters<T>& p, const G& cos_theta) {
@@ -236,12 +243,6 @@ struct Slab {
   }
 
  private:
-  template <class T, class G>
-  LOBEFIT_TEXT static LobeAlbedo<T> lobes_albedo(const Parameters<T>& p, const G& cos_theta) {
-    return LobeAlbedo<T>::mix(LobeAlbedo<T>::of(cos_theta, T(square(p.roughness))),
-                              LobeAlbedo<T>::of(cos_theta, T(square(p.second_roughness))), p.second_roughness_weight);
-  }
-
   /// An opaque body's BRDF of unit albedo.
   template <int choice, class T, class G>
   LOBEFIT_TEXT static Vec3<T> diffuse(const Parameters<T>& p, const Geometry<G>& g) {
