@@ -121,21 +121,45 @@ class TreeReader {
   }
 
   int read(const JsonReader& reader) {
-    if (reader.value().is_string()) return read_name(reader);
+    // Trees are walked by recursion.
+    if (depth_ == most_depth) {
+      throw reader.error(fmt::format("more than {} nodes inside each other", most_depth), "leave out some operators");
+    }
+    ++depth_;
+    const int index = reader.value().is_string() ? read_name(reader) : read_node(reader);
+    --depth_;
+    return index;
+  }
+
+  /// Nodes that nothing uses have their mistakes told too.
+  void read_unused() {
+    const std::size_t used = tree.nodes.size();
+    for (const auto& [name, reader] : named_) read_named(name, reader, reader);
+    tree.nodes.resize(used);
+  }
+
+ private:
+  static constexpr int most_depth = 100;
+
+  int read_node(const JsonReader& reader) {
+    static const std::vector<std::string> known{"slab", "vertical", "horizontal", "coverage", "select", "unreal"};
     // The document itself carries more than its node.
+    static const std::vector<std::string> of_document{"$schema", "title", "description", "thin", "nodes", "root"};
+    const bool document = reader.path() == "$";
     std::vector<std::pair<std::string, JsonReader>> kinds;
     for (const auto& [key, member] : reader.members()) {
-      if (reader.path() == "$" && (key == "$schema" || key == "title" || key == "description" || key == "thin" ||
-                                   key == "nodes" || key == "root")) {
-        continue;
+      if (document && std::find(of_document.begin(), of_document.end(), key) != of_document.end()) continue;
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        std::vector<std::string> names = known;
+        if (document) names.insert(names.end(), of_document.begin(), of_document.end());
+        throw reader.error("unknown key '" + key + "'", "did you mean '" + nearest_name(key, names) + "'?");
       }
       kinds.emplace_back(key, member);
     }
-    if (reader.path() == "$" && reader.has("root")) {
+    if (document && reader.has("root")) {
       if (!kinds.empty()) throw reader.error("'root' beside a node", "move the node into root, or into nodes");
       return read(reader.at("root"));
     }
-    static const std::vector<std::string> known{"slab", "vertical", "horizontal", "coverage", "select", "unreal"};
     if (kinds.size() != 1) {
       throw reader.error(fmt::format("expected one of {}, got {} of them", fmt::join(known, ", "), kinds.size()),
                          "write {\"slab\": { … }} or an operator");
@@ -152,11 +176,9 @@ class TreeReader {
           {.kind = Operator::coverage, .first = operand, .amount = number_between(member.at("weight"), 0.0, 1.0)},
           member);
     }
-    if (kind == "unreal") return read_unreal(member);
-    throw reader.error("unknown key '" + kind + "'", "did you mean '" + nearest_name(kind, known) + "'?");
+    return read_unreal(member);
   }
 
- private:
   int add(TreeNode node, const JsonReader& reader) {
     node.path = reader.path();
     return tree.add(std::move(node));
@@ -230,13 +252,18 @@ class TreeReader {
       throw reader.error("no node is named '" + name + "'",
                          names.empty() ? "add it to \"nodes\"" : "did you mean '" + nearest_name(name, names) + "'?");
     }
+    return read_named(found->first, found->second, reader);
+  }
+
+  /// `user` is where the name stands.
+  int read_named(const std::string& name, const JsonReader& reader, const JsonReader& user) {
     if (const auto done = finished_.find(name); done != finished_.end()) return done->second;
     if (std::find(open_.begin(), open_.end(), name) != open_.end()) {
       open_.push_back(name);
-      throw reader.error(fmt::format("a cycle: {}", fmt::join(open_, " → ")), "a node can't contain itself");
+      throw user.error(fmt::format("a cycle: {}", fmt::join(open_, " → ")), "a node can't contain itself");
     }
     open_.push_back(name);
-    const int index = read(found->second);
+    const int index = read(reader);
     open_.pop_back();
     finished_.emplace(name, index);
     return index;
@@ -245,6 +272,7 @@ class TreeReader {
   std::map<std::string, JsonReader> named_;
   std::map<std::string, int> finished_;
   std::vector<std::string> open_;
+  int depth_ = 0;
 };
 
 }  // namespace
@@ -252,24 +280,39 @@ class TreeReader {
 SlabTree tree_from_json(const JsonReader& reader) {
   TreeReader nodes(reader);
   if (reader.has("thin")) nodes.tree.thin = reader.at("thin").boolean();
+  for (const char* key : {"$schema", "title", "description"}) {
+    if (reader.has(key)) reader.at(key).text();
+  }
   nodes.tree.root = nodes.read(reader);
-  // Counted before shared nodes are copied: a few dozen lines can name 2^30 of them.
-  std::vector<double> slabs(nodes.tree.nodes.size());
-  for (std::size_t i = 0; i < slabs.size(); ++i) {
+  nodes.read_unused();
+  // Counted before shared nodes are copied: a few dozen lines can name 2^30 of them. What selections leave out is
+  // copied when a tree is written or drawn.
+  struct Count {
+    double walked = 0.0, written = 0.0;
+  };
+  std::vector<Count> counts(nodes.tree.nodes.size());
+  for (std::size_t i = 0; i < counts.size(); ++i) {
     const TreeNode& node = nodes.tree.nodes[i];
-    const auto of = [&](int operand) { return operand < 0 ? 0.0 : slabs[static_cast<std::size_t>(operand)]; };
+    const auto of = [&](int operand) { return operand < 0 ? Count{} : counts[static_cast<std::size_t>(operand)]; };
+    const Count first = of(node.first), second = of(node.second);
     if (node.kind == Operator::slab) {
-      slabs[i] = 1.0;
+      counts[i] = {1.0, 1.0};
     } else if (node.kind == Operator::select) {
-      slabs[i] = of(node.amount < 0.5 ? node.first : node.second);
+      counts[i] = {node.amount < 0.5 ? first.walked : second.walked, first.written + second.written};
     } else {
-      slabs[i] = of(node.first) + of(node.second);
+      counts[i] = {first.walked + second.walked, first.written + second.written};
     }
   }
-  const double count = slabs[static_cast<std::size_t>(nodes.tree.root)];
-  if (count > static_cast<double>(most_closures)) {
-    throw reader.error(fmt::format("{} slabs, and at most {} closures are supported", count, most_closures),
+  const Count count = counts[static_cast<std::size_t>(nodes.tree.root)];
+  if (count.walked > static_cast<double>(most_closures)) {
+    throw reader.error(fmt::format("{} slabs, and at most {} closures are supported", count.walked, most_closures),
                        "merge or leave out some");
+  }
+  constexpr double most_written = 64;
+  if (count.written > most_written) {
+    throw reader.error(fmt::format("{} slabs with those that selections leave out, and at most {} are supported",
+                                   count.written, most_written),
+                       "select between fewer");
   }
   return nodes.tree;
 }
