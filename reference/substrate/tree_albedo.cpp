@@ -2,18 +2,30 @@
 
 namespace lobefit {
 
+namespace {
+
+/// Van der Corput's sequence: the bits of `i` behind the point, in reverse.
+double radical_inverse(std::uint32_t i) {
+  double value = 0.0;
+  for (double digit = 0.5; i != 0; i >>= 1, digit *= 0.5) value += digit * (i & 1u);
+  return value;
+}
+
+}  // namespace
+
+// Hammersley's points: their first number decides the lobe, and each lobe gets its share of them to one point, spread
+// well by the second. On a square grid lobes would get whole columns.
 std::vector<Rgb> closure_albedos(const std::vector<Closure>& closures, const Direction& wo, int steps) {
   std::vector<Rgb> albedos(closures.size(), Rgb{0.0, 0.0, 0.0});
-  const double step = 1.0 / steps;
+  const auto count = static_cast<std::uint32_t>(steps * steps);
+  const double weight = 1.0 / count;
   for (std::size_t k = 0; k < closures.size(); ++k) {
-    for (int i = 0; i < steps; ++i) {
-      for (int j = 0; j < steps; ++j) {
-        const Direction wi = Slab::sample(closures[k].slab, wo, {(i + 0.5) * step, (j + 0.5) * step});
-        if (wi.z <= 0.0) continue;
-        const double density = Slab::pdf(closures[k].slab, wi, wo);
-        if (density <= 0.0) continue;
-        albedos[k] = albedos[k] + closures[k].evaluate(wi, wo) * (wi.z * step * step / density);
-      }
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const Direction wi = Slab::sample(closures[k].slab, wo, {(i + 0.5) * weight, radical_inverse(i)});
+      if (wi.z <= 0.0) continue;
+      const double density = Slab::pdf(closures[k].slab, wi, wo);
+      if (density <= 0.0) continue;
+      albedos[k] = albedos[k] + closures[k].evaluate(wi, wo) * (wi.z * weight / density);
     }
   }
   return albedos;

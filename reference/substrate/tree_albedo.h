@@ -5,8 +5,8 @@
 
 namespace lobefit {
 
-/// ∫ f cosine dω_i for a viewer at wo: stratified importance sampling of each closure, steps² directions each; to about
-/// 1e-3 at 24 steps.
+/// ∫ f cosine dω_i for a viewer at wo: importance sampling of each closure, steps² directions each. At 24 steps the
+/// error over the shipped trees is 1e-4 in the median and 2e-3 at most.
 Rgb directional_albedo(const std::vector<Closure>& closures, const Direction& wo, int steps = 24);
 
 /// Of each closure alone: what a path tracer chooses by (S2: one closure, with probability in proportion).
