@@ -46,6 +46,7 @@ void add_refit(CLI::App& app, Context& context);
 void add_check(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_plot(CLI::App& app, Context& context);
+void add_slab(CLI::App& app, Context& context);
 void add_study(CLI::App& app, Context& context);
 
 /// An option that may be given several times, one value each: CLI11's own would swallow what follows.

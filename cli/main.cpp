@@ -100,6 +100,7 @@ int run(int argc, char** argv) {
   add_export(app, context);
   add_plot(app, context);
   add_sphere(app, context);
+  add_slab(app, context);
   add_study(app, context);
   for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) {
     verb->fallthrough();

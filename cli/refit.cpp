@@ -9,6 +9,7 @@
 #include "cli/output_folder.h"
 #include "cli/refit_curves.h"
 #include "cli/shader_text.h"
+#include "cli/substrate_rules.h"
 #include "evaluate/check.h"
 #include "evaluate/shader.h"
 #include "fit/recipe.h"
@@ -21,11 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path recipe_folder() {
-  // Beside the program's sources when run from the build tree; an installed program has them elsewhere.
-  if (const char* folder = std::getenv("LOBEFIT_DATA")) return fs::path(folder) / "recipes";
-  return fs::path(LOBEFIT_DATA_FOLDER) / "recipes";
-}
+fs::path recipe_folder() { return data_folder() / "recipes"; }
 
 std::vector<std::string> shipped_recipes() {
   std::vector<std::string> names;
@@ -230,11 +227,12 @@ void refit_constants(const fs::path& path, const std::string& output, const Cont
   }
 }
 
-void run(const std::string& name, const std::string& output, const Context& context) {
+void run(const std::string& name, const std::string& output, bool resume, const Context& context) {
   const fs::path path = find_recipe(name);
   switch (recipe_kind(path)) {
     case RecipeKind::constants: return refit_constants(path, output, context);
     case RecipeKind::curves: return refit_curves(path, output, context);
+    case RecipeKind::substrate_rules: return refit_substrate_rules(path, output, resume, context);
   }
 }
 
@@ -251,23 +249,24 @@ void add_refit(CLI::App& app, Context& context) {
                                           shipped);
   struct Arguments {
     std::string name, output;
-    bool all = false;
+    bool all = false, resume = false;
   };
   const auto a = std::make_shared<Arguments>();
   auto* name = verb->add_option("RECIPE", a->name, "Shipped recipe or JSON file");
   auto* all = verb->add_flag("--all", a->all, "Every shipped recipe");
   name->excludes(all);
   verb->add_option("-o,--output", a->output, "Folder for the results (default: out/RECIPE)");
+  verb->add_flag("--resume", a->resume, "Go on with the tables that an interrupted run kept (substrate-rules)");
   verb->callback([&context, a] {
     if (a->name.empty() && !a->all) {
       throw Error(ExitCode::usage, "refit what?", "refit", "name a recipe, or use --all");
     }
     if (!a->all) {
-      run(a->name, a->output, context);
+      run(a->name, a->output, a->resume, context);
       return;
     }
     for (const std::string& recipe : shipped_recipes()) {
-      run(recipe, a->output.empty() ? "" : (fs::path(a->output) / recipe).string(), context);
+      run(recipe, a->output.empty() ? "" : (fs::path(a->output) / recipe).string(), a->resume, context);
     }
   });
 }

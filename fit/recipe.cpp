@@ -186,7 +186,7 @@ RecipeKind recipe_kind(const std::filesystem::path& path) {
   const JsonReader kind = reader.at("kind");
   const auto found = std::ranges::find(recipe_kind_names, kind.text());
   if (found == recipe_kind_names.end()) {
-    throw kind.error("unknown kind '" + kind.text() + "'", "choose constants or curves");
+    throw kind.error("unknown kind '" + kind.text() + "'", "choose constants, curves or substrate_rules");
   }
   return static_cast<RecipeKind>(found - recipe_kind_names.begin());
 }

@@ -17,8 +17,8 @@
 
 namespace lobefit {
 
-enum class RecipeKind { constants, curves };
-inline constexpr std::array<std::string_view, 2> recipe_kind_names{"constants", "curves"};
+enum class RecipeKind { constants, curves, substrate_rules };
+inline constexpr std::array<std::string_view, 3> recipe_kind_names{"constants", "curves", "substrate_rules"};
 /// What a recipe's "kind" says; without one it is of constants. Throws Error(invalid_input).
 RecipeKind recipe_kind(const std::filesystem::path& path);
 

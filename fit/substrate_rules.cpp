@@ -77,16 +77,16 @@ template <class T>
   }
 }
 
-template <bool haze, class T>
+template <LobeMerge merge, class T>
 [[gnu::noinline]] Slab::Parameters<T> layered_slab(const Slab::Parameters<T>& top, const Slab::Parameters<T>& bottom,
                                                    double cos_theta_o, const FittedBlend::Constants<T>& c) {
-  return FittedBlend::vertical<haze>(top, bottom, cos_theta_o, c);
+  return FittedBlend::vertical<merge>(top, bottom, cos_theta_o, c);
 }
-template <bool haze, class T>
+template <LobeMerge merge, class T>
 [[gnu::noinline]] Slab::Parameters<T> mixed_slab(const Slab::Parameters<T>& background,
                                                  const Slab::Parameters<T>& foreground, const T& mix,
                                                  double cos_theta_o, const FittedBlend::Constants<T>& c) {
-  return FittedBlend::horizontal<haze>(background, foreground, mix, cos_theta_o, c);
+  return FittedBlend::horizontal<merge>(background, foreground, mix, cos_theta_o, c);
 }
 
 /// Directional albedo of an opaque slab: the interface by its table, the body by quadrature.
@@ -137,11 +137,11 @@ class RuleProblem {
   template <class T>
   void residuals(std::size_t pair, const FittedBlend::Constants<T>& c, T* out) const {
     if (pair < pairs_.layers.size()) {
-      layer_residuals<false, T>(pair, c, out);
-      layer_residuals<true, T>(pair, c, out);
+      layer_residuals<LobeMerge::mean, T>(pair, c, out);
+      layer_residuals<LobeMerge::both, T>(pair, c, out);
     } else {
-      mix_residuals<false, T>(pair - pairs_.layers.size(), c, out);
-      mix_residuals<true, T>(pair - pairs_.layers.size(), c, out);
+      mix_residuals<LobeMerge::mean, T>(pair - pairs_.layers.size(), c, out);
+      mix_residuals<LobeMerge::both, T>(pair - pairs_.layers.size(), c, out);
     }
   }
 
@@ -164,13 +164,13 @@ class RuleProblem {
     one(f.x, truth.x), one(f.y, truth.y), one(f.z, truth.z);
   }
 
-  template <bool haze, class T>
+  template <LobeMerge merge, class T>
   void layer_residuals(std::size_t number, const FittedBlend::Constants<T>& c, T*& out) const {
     const LayeredPair& pair = pairs_.layers[number];
     const Slab::Parameters<T> top = promoted<T>(prepared(pair.top)), bottom = promoted<T>(prepared(pair.bottom));
     std::vector<Slab::Parameters<T>> slabs;
     for (const Direction& wo : Directions::get().views) {
-      slabs.push_back(layered_slab<haze, T>(top, bottom, wo.z, c));
+      slabs.push_back(layered_slab<merge, T>(top, bottom, wo.z, c));
     }
     const Directions& directions = Directions::get();
     const std::size_t views = directions.views.size(), lights = directions.lights.size();
@@ -204,7 +204,7 @@ class RuleProblem {
     }
   }
 
-  template <bool haze, class T>
+  template <LobeMerge merge, class T>
   void mix_residuals(std::size_t number, const FittedBlend::Constants<T>& c, T*& out) const {
     const MixedPair& pair = pairs_.mixes[number];
     const SlabValues background = prepared(pair.background), foreground = prepared(pair.foreground);
@@ -212,7 +212,7 @@ class RuleProblem {
     const Directions& directions = Directions::get();
     const double weight = std::sqrt(1.0 / static_cast<double>(3 * directions.views.size() * directions.lights.size()));
     for (const Direction& wo : directions.views) {
-      const Slab::Parameters<T> slab = mixed_slab<haze, T>(a, b, T(pair.mix), wo.z, c);
+      const Slab::Parameters<T> slab = mixed_slab<merge, T>(a, b, T(pair.mix), wo.z, c);
       for (const Direction& wi : directions.lights) {
         const Rgb truth =
             lerp(opaque_brdf<double>(background, wi, wo), opaque_brdf<double>(foreground, wi, wo), pair.mix);
@@ -322,8 +322,8 @@ std::vector<RuleScore> score_rules(const RulePairs& pairs, const RuleConstants& 
     for (std::size_t v = 0; v < views; ++v) {
       const Direction& wo = directions.views[v];
       const SlabValues slabs[] = {BaselineBlend::vertical(pair.top, pair.bottom),
-                                  layered_slab<false, double>(pair.top, pair.bottom, wo.z, constants),
-                                  layered_slab<true, double>(pair.top, pair.bottom, wo.z, constants)};
+                                  layered_slab<LobeMerge::mean, double>(pair.top, pair.bottom, wo.z, constants),
+                                  layered_slab<LobeMerge::both, double>(pair.top, pair.bottom, wo.z, constants)};
       const Rgb shown[ways] = {slab_albedo(slabs[0], wo), directional_albedo(closures, wo), slab_albedo(slabs[1], wo),
                                slab_albedo(slabs[2], wo)};
       for (int way = 0; way < ways; ++way) {
@@ -371,8 +371,8 @@ MixScore score_mixes(const RulePairs& pairs, const RuleConstants& constants, con
       for (const Direction& wo : directions.views) {
         const SlabValues &a = pair.background, &b = pair.foreground;
         const SlabValues slab = way == 0   ? BaselineBlend::horizontal(a, b, pair.mix)
-                                : way == 1 ? mixed_slab<false, double>(a, b, pair.mix, wo.z, constants)
-                                           : mixed_slab<true, double>(a, b, pair.mix, wo.z, constants);
+                                : way == 1 ? mixed_slab<LobeMerge::mean, double>(a, b, pair.mix, wo.z, constants)
+                                           : mixed_slab<LobeMerge::both, double>(a, b, pair.mix, wo.z, constants);
         for (const Direction& wi : directions.lights) {
           const Rgb truth = lerp(opaque_brdf<double>(a, wi, wo), opaque_brdf<double>(b, wi, wo), pair.mix);
           const Rgb shown = opaque_brdf<double>(slab, wi, wo);

@@ -161,6 +161,9 @@ LOBEFIT_TEXT Vec3<T> f0_of_albedo(const Vec3<T>& specular, const LobeAlbedo<T>& 
   });
 }
 
+/// What becomes of two slabs' lobes: their mean alpha, both (a second lobe), or one of them alone with all the light.
+enum class LobeMerge { mean, both, first, second };
+
 /// Closed forms with fitted constants, at a view: a material is shaded where the view is known, so that what is stored
 /// may depend on it, as the walk's throughputs do. Where no view is known (a ray's payload) take mean_view.
 ///
@@ -316,16 +319,21 @@ struct FittedBlend {
     return constants;
   }
 
-  /// Two lobes kept apart instead of averaged.
-  template <bool haze, class T>
+  template <LobeMerge merge, class T>
   LOBEFIT_TEXT static void merge_lobes(Slab::Parameters<T>& result, const T& alpha_a, const T& light_a,
                                        const T& alpha_b, const T& light_b, const T& power) {
     const T share = let("share", light_b / max(light_a + light_b, 1e-9));
     const T a = let("a", max(alpha_a, 1e-4)), b = let("b", max(alpha_b, 1e-4));
-    if constexpr (haze) {
+    if constexpr (merge == LobeMerge::both) {
       result.roughness = sqrt(a);
       result.second_roughness = sqrt(b);
       result.second_roughness_weight = share;
+    } else if constexpr (merge == LobeMerge::first) {
+      result.roughness = sqrt(a);
+      result.second_roughness_weight = T(0.0);
+    } else if constexpr (merge == LobeMerge::second) {
+      result.roughness = sqrt(b);
+      result.second_roughness_weight = T(0.0);
     } else {
       // x^m to the first order in m at m = 0, where the mean is geometric.
       const T m = let("m", select(abs(power) < 1e-3, T(1e-3), power));
@@ -349,7 +357,7 @@ struct FittedBlend {
     result.diffuse_albedo = at_most(body * gain / max(left, 0.02), 1.0);
   }
 
-  template <bool haze = false, class T, class G>
+  template <LobeMerge merge = LobeMerge::mean, class T, class G>
   LOBEFIT_TEXT static Slab::Parameters<T> horizontal(const Slab::Parameters<T>& background,
                                                      const Slab::Parameters<T>& foreground, const T& mix,
                                                      const G& cos_theta_o, const Constants<T>& c) {
@@ -363,7 +371,7 @@ struct FittedBlend {
     const T share = let("share_b", light_b / max(light_a + light_b, 1e-9));
     result.f90 = lerp(background.f90, foreground.f90, share);
     result.anisotropy = lerp(background.anisotropy, foreground.anisotropy, share);
-    merge_lobes<haze>(result, slab_alpha(background), light_a, slab_alpha(foreground), light_b, c.mix_power);
+    merge_lobes<merge>(result, slab_alpha(background), light_a, slab_alpha(foreground), light_b, c.mix_power);
     // Both bodies lose the same to their diffuse model: no gain.
     Constants<T> neutral = c;
     neutral.gain = neutral.gain_roughness = neutral.gain_roughness2 = T(0.0);
@@ -372,7 +380,7 @@ struct FittedBlend {
     return result;
   }
 
-  template <bool haze = false, class T, class G>
+  template <LobeMerge merge = LobeMerge::mean, class T, class G>
   LOBEFIT_TEXT static Slab::Parameters<T> vertical(const Slab::Parameters<T>& top, const Slab::Parameters<T>& bottom,
                                                    const G& cos_theta_o, const Constants<T>& c) {
     const auto index_of = [](const T& f0) {
@@ -448,7 +456,7 @@ struct FittedBlend {
     Slab::Parameters<T> result = lerp_slabs(top, bottom, share);
     const T wide = let("wide", c.stretch * log(n));
     const T blurred = let("blurred", sqrt(square(bottom_alpha * exp(wide)) + square(c.blur * (n - 1.0) * alpha)));
-    merge_lobes<haze>(result, alpha, light_top, T(min(blurred, 1.0)), light, c.layer_power);
+    merge_lobes<merge>(result, alpha, light_top, T(min(blurred, 1.0)), light, c.layer_power);
     set_light(result, coat + specular, diffuse * (1.0 - coat), cos_theta_o, c);
 
     // Fibres: those on top, or those that reach through a top without an interface.

@@ -9,9 +9,11 @@
 
 namespace lobefit {
 
-/// How two slabs become one, and for which view. fitted_haze keeps two lobes where they differ, for 4 bytes.
-enum class BlendRule { baseline, fitted, fitted_haze };
-inline constexpr std::array<std::string_view, 3> blend_rule_names{"baseline", "fitted", "fitted_haze"};
+/// How two slabs become one. Of the fitted rules, fitted_haze keeps two lobes where they differ, for 4 bytes;
+/// fitted_first and fitted_second keep the lobe of the top or background, or of the other, with all the light.
+enum class BlendRule { baseline, fitted, fitted_haze, fitted_first, fitted_second };
+inline constexpr std::array<std::string_view, 5> blend_rule_names{"baseline", "fitted", "fitted_haze", "fitted_first",
+                                                                  "fitted_second"};
 
 /// What the fitted rules need: their constants, and the cosine of the view that the material is stored for.
 struct BlendSetting {
@@ -24,7 +26,12 @@ inline SlabValues blend_horizontal(const SlabValues& background, const SlabValue
   switch (rule) {
     case BlendRule::baseline: return BaselineBlend::horizontal(background, foreground, mix);
     case BlendRule::fitted: return FittedBlend::horizontal(background, foreground, mix, at.cos_theta_o, at.constants);
-    default: return FittedBlend::horizontal<true>(background, foreground, mix, at.cos_theta_o, at.constants);
+    case BlendRule::fitted_haze:
+      return FittedBlend::horizontal<LobeMerge::both>(background, foreground, mix, at.cos_theta_o, at.constants);
+    case BlendRule::fitted_first:
+      return FittedBlend::horizontal<LobeMerge::first>(background, foreground, mix, at.cos_theta_o, at.constants);
+    default:
+      return FittedBlend::horizontal<LobeMerge::second>(background, foreground, mix, at.cos_theta_o, at.constants);
   }
 }
 inline SlabValues blend_vertical(const SlabValues& top, const SlabValues& bottom, BlendRule rule,
@@ -32,7 +39,11 @@ inline SlabValues blend_vertical(const SlabValues& top, const SlabValues& bottom
   switch (rule) {
     case BlendRule::baseline: return BaselineBlend::vertical(top, bottom);
     case BlendRule::fitted: return FittedBlend::vertical(top, bottom, at.cos_theta_o, at.constants);
-    default: return FittedBlend::vertical<true>(top, bottom, at.cos_theta_o, at.constants);
+    case BlendRule::fitted_haze:
+      return FittedBlend::vertical<LobeMerge::both>(top, bottom, at.cos_theta_o, at.constants);
+    case BlendRule::fitted_first:
+      return FittedBlend::vertical<LobeMerge::first>(top, bottom, at.cos_theta_o, at.constants);
+    default: return FittedBlend::vertical<LobeMerge::second>(top, bottom, at.cos_theta_o, at.constants);
   }
 }
 
@@ -320,7 +331,8 @@ inline std::vector<SimplifiedTree> simplify_by_error(const SlabTree& given,
                                                      const FittedBlend::Constants<double>& constants,
                                                      const std::function<double(std::span<const SimplifyStep>)>& error,
                                                      std::size_t beam = 8) {
-  constexpr std::array rules{BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze};
+  constexpr std::array rules{BlendRule::baseline, BlendRule::fitted, BlendRule::fitted_haze, BlendRule::fitted_first,
+                             BlendRule::fitted_second};
   std::vector<SimplifiedTree> all;
   const auto judge = [&](SimplifiedTree stage) {
     stage.error = error(stage.steps);
