@@ -232,10 +232,8 @@ std::string rules_page(const RuleRecipe& recipe, const LeastSquaresSolution& sol
       "7. α_b' = √((n^e α_b)² + (b (n - 1) α_t)²); one lobe: α = ((E_t α_t^m + L α_b'^m)/(E_t + L))^(1/m), m = m_v, L "
       "the lobe of 6; two lobes: α_t, and α_b' with weight L/(E_t + L).\n"
       "8. F0 and diffuse albedo of the result: those with which the slab returns E_t + L and the body at μ; the body "
-      "times 1 + G_0 + G_1 r + G_2 r² + (1 - μ)² (H_0 + H_1 r + H_2 r²) for what the diffuse model (";
-  page +=
-      recipe.diffuse_model +
-      ") loses.\n\n**Horizontal**: E and body = (1 - E) ρ are lerped and inverted as in 8 without gain; alphas as in "
+      "over what the diffuse model keeps of the light at μ (Chan's, by the table of models/energy/chan_albedo.h).\n\n"
+      "**Horizontal**: E and body = (1 - E) ρ are lerped and inverted as in 8; alphas as in "
       "7 with m_h. **Coverage**: the outcomes (both, top alone, bottom alone) mixed horizontally in proportion.\n\n"
       "## Constants\n\n| constant | | value | 95 % interval | |\n|---|---|---|---|---|\n";
   std::size_t k = 0;

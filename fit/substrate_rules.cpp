@@ -14,7 +14,7 @@ namespace lobefit {
 
 namespace {
 
-constexpr int constant_count = 19;
+constexpr int constant_count = 13;
 static_assert(sizeof(RuleConstants) == constant_count * sizeof(double));
 using RuleDual = Dual<constant_count>;
 

@@ -10,6 +10,7 @@
 // Both take slabs that are fully there; partial coverage is a mix of the outcomes: see blend_vertical().
 #pragma once
 
+#include "models/energy/chan_albedo.h"
 #include "models/substrate/diffuse_fresnel.h"
 #include "models/substrate/slab.h"
 
@@ -187,8 +188,7 @@ struct FittedBlend {
   template <class T>
   struct Constants {
     T light_path, lobe_path, milky_path, inside_path, scattering, rough_interior, rough_fresnel, trapping, top_trapping,
-        stretch, blur, layer_power, mix_power, gain, gain_roughness, gain_roughness2, grazing_gain,
-        grazing_gain_roughness, grazing_gain_roughness2;
+        stretch, blur, layer_power, mix_power;
   };
 
   /// Names, starting values (what smooth optics or plain averaging would have) and bounds.
@@ -275,42 +275,6 @@ struct FittedBlend {
                                      .upper = 3.0,
                                      .initial = 1.0,
                                      .doc = "power of the mean of two mixed alphas"});
-    visit(c.gain, ParameterInfo{.name = "gain",
-                                .symbol = "G_0",
-                                .lower = -3.0,
-                                .upper = 3.0,
-                                .initial = 0.0,
-                                .doc = "what the diffuse model must be given for what it loses"});
-    visit(c.gain_roughness, ParameterInfo{.name = "gain_roughness",
-                                          .symbol = "G_1",
-                                          .lower = -3.0,
-                                          .upper = 3.0,
-                                          .initial = 0.0,
-                                          .doc = "and times roughness"});
-    visit(c.gain_roughness2, ParameterInfo{.name = "gain_roughness2",
-                                           .symbol = "G_2",
-                                           .lower = -3.0,
-                                           .upper = 3.0,
-                                           .initial = 0.0,
-                                           .doc = "and times roughness²"});
-    visit(c.grazing_gain, ParameterInfo{.name = "grazing_gain",
-                                        .symbol = "H_0",
-                                        .lower = -3.0,
-                                        .upper = 3.0,
-                                        .initial = 0.0,
-                                        .doc = "the same over (1 - μ)²"});
-    visit(c.grazing_gain_roughness, ParameterInfo{.name = "grazing_gain_roughness",
-                                                  .symbol = "H_1",
-                                                  .lower = -3.0,
-                                                  .upper = 3.0,
-                                                  .initial = 0.0,
-                                                  .doc = "and times roughness"});
-    visit(c.grazing_gain_roughness2, ParameterInfo{.name = "grazing_gain_roughness2",
-                                                   .symbol = "H_2",
-                                                   .lower = -3.0,
-                                                   .upper = 3.0,
-                                                   .initial = 0.0,
-                                                   .doc = "and times roughness²"});
   }
 
   static Constants<double> initial() {
@@ -342,19 +306,22 @@ struct FittedBlend {
     }
   }
 
+  /// What an opaque body's diffuse model keeps of the light: Chan's loses some.
+  template <class T, class G>
+  LOBEFIT_TEXT static T body_keeps(const Slab::Parameters<T>& slab, const G& cos_theta_o) {
+    const T chan = let("chan", call<ChanAlbedo>(cos_theta_o, slab.roughness));
+    return select(slab.diffuse_model < 0.5, chan, T(1.0));
+  }
+
   /// The slab that returns this light at the view, its lobes being set already.
   template <class T, class G>
   LOBEFIT_TEXT static void set_light(Slab::Parameters<T>& result, const Vec3<T>& specular, const Vec3<T>& body,
-                                     const G& cos_theta_o, const Constants<T>& c) {
+                                     const G& cos_theta_o) {
     const LobeAlbedo<T> albedo = Slab::lobes_albedo(result, cos_theta_o);
     result.f0 = f0_of_albedo(specular, albedo);
     Vec3<T> left = 1.0 - Slab::specular_albedo(result, cos_theta_o);
-    const T r = result.roughness;
-    const T grazing = let("grazing", square(T(1.0 - cos_theta_o)));
-    const T gain =
-        let("gain", 1.0 + c.gain + r * (c.gain_roughness + r * c.gain_roughness2) +
-                        grazing * (c.grazing_gain + r * (c.grazing_gain_roughness + r * c.grazing_gain_roughness2)));
-    result.diffuse_albedo = at_most(body * gain / max(left, 0.02), 1.0);
+    const T kept = let("kept", body_keeps(result, cos_theta_o));
+    result.diffuse_albedo = at_most(body / (kept * max(left, 0.02)), 1.0);
   }
 
   template <LobeMerge merge = LobeMerge::mean, class T, class G>
@@ -364,19 +331,15 @@ struct FittedBlend {
     Slab::Parameters<T> result = lerp_slabs(background, foreground, mix);
     Vec3<T> specular_a = Slab::specular_albedo(background, cos_theta_o);
     Vec3<T> specular_b = Slab::specular_albedo(foreground, cos_theta_o);
-    Vec3<T> body =
-        lerp(background.diffuse_albedo * (1.0 - specular_a), foreground.diffuse_albedo * (1.0 - specular_b), mix);
+    Vec3<T> body = lerp(background.diffuse_albedo * ((1.0 - specular_a) * body_keeps(background, cos_theta_o)),
+                        foreground.diffuse_albedo * ((1.0 - specular_b) * body_keeps(foreground, cos_theta_o)), mix);
     const T light_a = let("light_a", (1.0 - mix) * mean_of_channels(specular_a));
     const T light_b = let("light_b", mix * mean_of_channels(specular_b));
     const T share = let("share_b", light_b / max(light_a + light_b, 1e-9));
     result.f90 = lerp(background.f90, foreground.f90, share);
     result.anisotropy = lerp(background.anisotropy, foreground.anisotropy, share);
     merge_lobes<merge>(result, slab_alpha(background), light_a, slab_alpha(foreground), light_b, c.mix_power);
-    // Both bodies lose the same to their diffuse model: no gain.
-    Constants<T> neutral = c;
-    neutral.gain = neutral.gain_roughness = neutral.gain_roughness2 = T(0.0);
-    neutral.grazing_gain = neutral.grazing_gain_roughness = neutral.grazing_gain_roughness2 = T(0.0);
-    set_light(result, lerp(specular_a, specular_b, mix), body, cos_theta_o, neutral);
+    set_light(result, lerp(specular_a, specular_b, mix), body, cos_theta_o);
     return result;
   }
 
@@ -457,7 +420,7 @@ struct FittedBlend {
     const T wide = let("wide", c.stretch * log(n));
     const T blurred = let("blurred", sqrt(square(bottom_alpha * exp(wide)) + square(c.blur * (n - 1.0) * alpha)));
     merge_lobes<merge>(result, alpha, light_top, T(min(blurred, 1.0)), light, c.layer_power);
-    set_light(result, coat + specular, diffuse * (1.0 - coat), cos_theta_o, c);
+    set_light(result, coat + specular, diffuse * (1.0 - coat), cos_theta_o);
 
     // Fibres: those on top, or those that reach through a top without an interface.
     const T open = let("open", saturate(1.0 - 50.0 * f0) * exp(-2.0 * mean_of_channels(depth)));
