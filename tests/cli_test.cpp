@@ -341,6 +341,63 @@ TEST_F(CommandLine, SamplesComeWithDensityAndValue) {
   expect_refused("sample lambert --wo 95,0", 2, {"theta", "95"});
 }
 
+TEST_F(CommandLine, SlabShowsEvaluatesSimplifiesAndValidates) {
+  const Json shown = json("slab show slide_collapse");
+  EXPECT_EQ(shown["closures"].size(), 3u);
+  int bits = 0;
+  for (const Json& field : shown["storage"]["fields"]) bits += field["part"] == "medium" ? 0 : field["bits"].get<int>();
+  EXPECT_EQ(bits + shown["storage"]["padding_bits"].get<int>(), 8 * shown["storage"]["bytes"].get<int>());
+  EXPECT_NE(run("slab show slide_collapse --fields --svg tree.svg").out.find("diffuse_albedo"), std::string::npos);
+  EXPECT_NE(content(folder_ / "tree.svg").find("<svg"), std::string::npos);
+
+  // A lone slab is the model `slab`.
+  std::ofstream(folder_ / "lone.json")
+      << R"({"slab": {"diffuse_albedo": [0.6, 0.3, 0.1], "f0": 0.05, "roughness": 0.4}})";
+  const Json tree = json("slab eval lone.json --wi 30,10 --wo 50,170");
+  const Json model =
+      json("eval slab --set diffuse_albedo=0.6,0.3,0.1 --set f0=0.05 --set roughness=0.4 --wi 30,10 --wo 50,170");
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(tree["values"][0]["f"][c].get<double>(), model["values"][0]["f"][c].get<double>(), 1e-12);
+  }
+
+  ASSERT_EQ(run("slab simplify slide_collapse --bytes 12 -o small.json").code, 0);
+  const Json small = json("slab show small.json");
+  EXPECT_EQ(small["storage"]["bytes"], 12);
+  EXPECT_EQ(small["closures"].size(), 1u);
+  expect_refused("slab simplify slide_collapse --bytes 11", 2, {"bytes"});
+
+  const Json validation = json("slab validate coated_metal --samples 32 -o out");
+  ASSERT_GE(validation["levels"].size(), 2u);
+  EXPECT_EQ(validation["levels"][0]["closures"], 2);
+  EXPECT_EQ(validation["levels"][0]["simplification"]["error"], 0.0);
+  EXPECT_GT(validation["levels"][0]["model"]["error"].get<double>(), 0.0);
+  for (const char* name : {"validation.json", "validation.md", "error.svg", "error.png", "tree.svg"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "out" / name)) << name;
+  }
+  expect_refused("slab validate coated_metal --samples 32 -o out", 2, {"out", "--force"});
+}
+
+TEST_F(CommandLine, BadTreesAreRefusedWithTheirJsonPath) {
+  const auto refuse = [&](const std::string& tree, std::initializer_list<const char*> fragments) {
+    std::ofstream(folder_ / "bad.json") << tree;
+    expect_refused("slab show bad.json", 3, fragments);
+  };
+  refuse(R"({"nodes": {"a": {"coverage": {"operand": "a", "weight": 0.5}}}, "root": "a"})", {"cycle", "a"});
+  refuse(R"({"slab": {"rougness": 0.5}})", {"rougness", "roughness", "$.slab"});
+  refuse(R"({"horizontal": {"background": {"slab": {}}, "mix": 0.5}})", {"foreground", "$.horizontal"});
+  refuse(R"({"coverage": {"operand": {"slab": {}}, "weight": 1.5}})", {"1.5", "$.coverage.weight"});
+  refuse(R"({"vertical": {"top": {"slab": {}}, "thickness": 1}})", {"nothing", "$.vertical"});
+  refuse(R"({"vertical": {"top": {"slab": {}}, "bottom": {"slab": {}}, "thickness": -1}})",
+         {"-1", "$.vertical.thickness"});
+  refuse(R"({"slab": {"mean_free_path": [1, -2, 3]}})", {"-2", "$.slab.mean_free_path[1]"});
+  refuse(R"({"nodes": {"a": {"slab": {}}, "b": {"horizontal": {"background": "a", "foreground": "a", "mix": 0.5}},
+            "c": {"horizontal": {"background": "b", "foreground": "b", "mix": 0.5}},
+            "d": {"horizontal": {"background": "c", "foreground": "c", "mix": 0.5}}},
+            "root": {"horizontal": {"background": "d", "foreground": "d", "mix": 0.5}}})",
+         {"16", "8"});
+  expect_refused("slab show car_pant", 2, {"car_paint"});
+}
+
 TEST_F(CommandLine, ReferenceMeetsPublishedValues) {
   // formulas.md, section 3: alpha = ½, GGX, height-correlated, one bounce, per unit albedo.
   const std::string at = "reference microfacet_diffuse --set alpha=0.5 --wi 60,0 --exact --wo ";
