@@ -306,8 +306,8 @@ std::string trees_figure(const std::vector<BudgetScore>& scores) {
     }
   }
   return chart_figure({panel}, {"baseline, deepest first", "fitted, deepest first", "fitted, error-driven"},
-                      "What simplifying Substrate trees costs", "error against the layers as matter",
-                      "bytes per pixel");
+                      "What simplifying Substrate trees costs", "error against the layers as matter", "bytes per pixel",
+                      {.left = 8.0, .right = 44.0, .tick = 4.0});
 }
 
 }  // namespace

@@ -7,7 +7,9 @@
 #include "cli/arguments.h"
 #include "cli/output_folder.h"
 #include "cli/substrate_rules.h"
+#include "evaluate/substrate_storage_error.h"
 #include "fit/substrate_rules.h"
+#include "models/substrate/regime.h"
 #include "reference/output_file.h"
 #include "reference/substrate/tree_albedo.h"
 #include "reference/substrate/tree_json.h"
@@ -64,6 +66,49 @@ Json closure_json(const Closure& closure, const Direction& wo) {
           {"slab", slab_json(closure.slab)}};
 }
 
+/// The closures as a pixel stores them for a view at 48 degrees.
+std::vector<StoredClosure> stored_closures(const std::vector<Closure>& closures) {
+  std::vector<StoredClosure> result;
+  for (const Closure& closure : closures) {
+    StoredClosure stored;
+    stored.slab = closure.slab;
+    // What a layer takes from light is stored with those below it; a clear one needs no medium of its own.
+    if (largest_channel(closure.slab.diffuse_albedo) <= 0.0) stored.slab.mean_free_path = {0.0, 0.0, 0.0};
+    stored.throughput = closure.view_throughput(FittedBlend::mean_view);
+    stored.transmittance_above = closure.light_above.transmittance;
+    stored.coverage_above = closure.light_above.coverage;
+    result.push_back(stored);
+  }
+  return result;
+}
+
+void print_packed(const std::vector<Closure>& closures) {
+  const std::vector<StoredClosure> stored = stored_closures(closures);
+  const PackedMaterial packed = pack_material(stored);
+  fmt::print("\nPacked into {} words{}\n", packed.words.size(),
+             packed.storage.medium_words > 0 ? fmt::format(", {} of them of media", packed.storage.medium_words) : "");
+  const UnpackedMaterial read = unpack_material(packed.words);
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (const double theta_o : {5.0, 30.0, 60.0}) {
+    for (const double theta_i : {5.0, 20.0, 40.0, 60.0, 75.0}) {
+      for (const double phi : {0.0, 90.0, 150.0, 180.0}) {
+        const Direction wo = direction(radians(theta_o), 0.0), wi = direction(radians(theta_i), radians(phi));
+        const Rgb a = closures_brdf(stored, {}, wi, wo), b = closures_brdf(read.closures, {}, wi, wo);
+        for (const auto& [x, y] : {std::pair{a.x, b.x}, std::pair{a.y, b.y}, std::pair{a.z, b.z}}) {
+          squares += square(std::log1p(20.0 * wi.z * std::max(x, 0.0)) - std::log1p(20.0 * wi.z * std::max(y, 0.0)));
+          ++count;
+        }
+      }
+    }
+  }
+  fmt::print("  quantisation: rms {:.2g} of log(1 + 20 f cos)\n", std::sqrt(squares / static_cast<double>(count)));
+  for (const StorageLoss& loss : packed.losses) {
+    fmt::print("  closure {}, {}: {}\n", loss.closure, loss.parameter, loss.words);
+  }
+  for (const std::string& words : not_stored()) fmt::print("  never stored: {}\n", words);
+}
+
 std::string title_of(const fs::path& path) {
   const Json json = parse_json(read_file(path), path.string());
   return json.contains("title") && json["title"].is_string() ? json["title"].get<std::string>() : path.stem().string();
@@ -73,12 +118,17 @@ void add_show(CLI::App& slab, Context& context) {
   CLI::App* verb = slab.add_subcommand("show", "Topology, closures and bytes of a tree");
   struct Arguments {
     std::string tree, svg;
-    bool fields = false;
+    bool fields = false, packed = false;
+    double pixel = 0.1;
   };
   const auto a = std::make_shared<Arguments>();
   verb->add_option("TREE", a->tree, tree_doc)->required();
   verb->add_option("--svg", a->svg, "Draw the topology into this file");
   verb->add_flag("--fields", a->fields, "List every stored field with its bits");
+  verb->add_flag("--packed", a->packed, "Pack the closures, and tell what quantisation does to the BRDF");
+  verb->add_option("--pixel", a->pixel, "Width that a pixel covers, cm: it decides how media are shaded")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   verb->callback([&context, a] {
     const fs::path path = find_tree(a->tree);
     const SlabTree tree = read_tree(path);
@@ -102,6 +152,18 @@ void add_show(CLI::App& slab, Context& context) {
     exact.exact_statistics = true;
     const std::size_t all = walk(tree, exact).size();
     if (all > closures.size()) fmt::print("(exact statistics of all coverage events: {} closures)\n", all);
+    fmt::print("\nMedia, for pixels {:g} cm wide:\n", a->pixel);
+    const SlabTree shaded = resolved(tree);
+    for (const TreeNode& node : shaded.nodes) {
+      if (node.kind != Operator::slab) continue;
+      // resolved() makes the lowest slabs opaque; how far light spreads in them is what the file says.
+      const bool lowest = is_opaque(node.slab);
+      const auto own = std::ranges::find(tree.nodes, node.path, &TreeNode::path);
+      const SlabValues& given = own == tree.nodes.end() ? node.slab : own->slab;
+      fmt::print("  {:<28} {}\n", node.name.empty() ? node.path : node.name,
+                 regime_names[static_cast<std::size_t>(regime_of(lowest ? given : node.slab, lowest, a->pixel))]);
+    }
+    if (a->packed) print_packed(closures);
     if (!a->fields || closures.empty()) return;
     for (const Json& field : storage["fields"]) {
       const int closure = field["closure"];
@@ -131,7 +193,7 @@ void add_slab_eval(CLI::App& slab, Context& context) {
       ->check(CLI::Range(0.0, 89.9));
   verb->add_flag("--exact-statistics", a->exact, "All coverage events apart, in place of one virtual slab above each");
   verb->add_flag("--no-roughness-tracking", a->untracked, "Layers above do not blur those below");
-  verb->add_flag("--closures", a->closures, "Each closure's share too");
+  verb->add_flag("--closures", a->closures, "Each closure's share too, and what a path tracer risks that chooses one");
   verb->callback([&context, a] {
     const SlabTree tree = read_tree(find_tree(a->tree));
     const std::vector<Closure> closures =
@@ -148,12 +210,28 @@ void add_slab_eval(CLI::App& slab, Context& context) {
       Json value{
           {"wi", parse_numbers(a->wi[i], "--wi")}, {"wo", parse_numbers(a->wo[i], "--wo")}, {"f", rgb_json(f, 3)}};
       if (!context.json) fmt::print("{}\n", rgb_text(f, 3));
-      for (const Closure& closure : closures) {
-        if (!a->closures) break;
-        const Rgb share = closure.evaluate(wi, wo);
-        value["closures"].push_back({{"path", closure.path}, {"name", closure.name}, {"f", rgb_json(share, 3)}});
+      if (a->closures) {
+        const ClosureSelection selection = ClosureSelection::of(closures, wo);
+        for (std::size_t k = 0; k < closures.size(); ++k) {
+          const Closure& closure = closures[k];
+          const Rgb share = closure.evaluate(wi, wo);
+          value["closures"].push_back({{"path", closure.path},
+                                       {"name", closure.name},
+                                       {"f", rgb_json(share, 3)},
+                                       {"probability", selection.probabilities[k]}});
+          if (!context.json) {
+            fmt::print("  {:<28} {}   chosen with probability {:.3f}\n",
+                       closure.name.empty() ? closure.path : closure.name, rgb_text(share, 3),
+                       selection.probabilities[k]);
+          }
+        }
+        const Rgb variance = selection.variance(closures, wi, wo);
+        value["selection_variance"] = rgb_json(variance, 3);
         if (!context.json) {
-          fmt::print("  {:<28} {}\n", closure.name.empty() ? closure.path : closure.name, rgb_text(share, 3));
+          fmt::print("  choosing one closure by albedo: standard deviation {:.3g}  {:.3g}  {:.3g} of f\n",
+                     std::sqrt(std::max(variance.x, 0.0)) / std::max(f.x, 1e-12),
+                     std::sqrt(std::max(variance.y, 0.0)) / std::max(f.y, 1e-12),
+                     std::sqrt(std::max(variance.z, 0.0)) / std::max(f.z, 1e-12));
         }
       }
       values.push_back(value);

@@ -52,7 +52,8 @@ FigureSize panel_size(std::size_t panels, int column_width) {
 }  // namespace
 
 std::string chart_figure(const std::vector<ChartPanel>& panels, const std::vector<std::string>& labels,
-                         const std::string& title, const std::string& subtitle, const std::string& horizontal) {
+                         const std::string& title, const std::string& subtitle, const std::string& horizontal,
+                         const ChartRange& range) {
   const std::size_t columns = chart_columns(panels.size()), lines = (panels.size() + columns - 1) / columns;
   std::string text = header(title, subtitle);
   for (std::size_t panel = 0; panel < panels.size(); ++panel) {
@@ -86,8 +87,8 @@ std::string chart_figure(const std::vector<ChartPanel>& panels, const std::vecto
       "left = 66.0; right = figure_width - 20.0; top = 94.0 + 20.0 * legend_lines; bottom = figure_height - 50.0\n"
       "gap_across = 62.0; gap_down = 40.0\n";
   text += panel_layout(columns, lines) + shared_axis_labels(horizontal, "");
-  text +=
-      "set grid linetype 1 linewidth 0.5 linecolor rgb '#e4e4e4' dashtype solid\nset xrange [0:1.02]; set xtics 0.25\n";
+  text += "set grid linetype 1 linewidth 0.5 linecolor rgb '#e4e4e4' dashtype solid\n";
+  text += fmt::format("set xrange [{:g}:{:g}]; set xtics {:g}\n", range.left, range.right, range.tick);
   text += "unset key\nset multiplot\n";
   for (std::size_t panel = 0; panel < panels.size(); ++panel) {
     const ChartPanel& own = panels[panel];

@@ -27,9 +27,15 @@ struct ChartPanel {
   double lower, upper;              // of the vertical axis; what lies beyond is cut off
 };
 
+/// Where the shared horizontal axis begins and ends, and its ticks.
+struct ChartRange {
+  double left = 0.0, right = 1.02, tick = 0.25;
+};
+
 /// A panel per quantity on a shared horizontal axis.
 std::string chart_figure(const std::vector<ChartPanel>& panels, const std::vector<std::string>& labels,
-                         const std::string& title, const std::string& subtitle, const std::string& horizontal);
+                         const std::string& title, const std::string& subtitle, const std::string& horizontal,
+                         const ChartRange& range = {});
 FigureSize chart_figure_size(const std::vector<ChartPanel>& panels);
 
 struct BarGroup {

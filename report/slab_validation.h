@@ -42,6 +42,13 @@ class TreeJudge {
   const SlabTree& tree() const { return tree_; }
   TreeErrors simplification(std::span<const SimplifyStep> steps) const;
   TreeErrors model(std::span<const SimplifyStep> steps) const;
+  /// Of the exact statistics, all coverage events apart: against the one virtual slab of the full tree, and against
+  /// matter.
+  struct ExactStatistics {
+    std::size_t closures = 0;
+    TreeErrors difference, model;
+  };
+  ExactStatistics exact_statistics() const;
   /// model(steps).error(), with fewer directions behind the albedos.
   double quick_error(std::span<const SimplifyStep> steps) const;
   /// rms of the truth's standard errors, of albedos relative: what no error can be told below.
@@ -53,7 +60,8 @@ class TreeJudge {
     std::vector<Rgb> brdf;
     Rgb albedo;
   };
-  std::vector<View> shown(std::span<const SimplifyStep> steps, int albedo_steps) const;
+  std::vector<View> shown(std::span<const SimplifyStep> steps, int albedo_steps,
+                          const WalkOptions& walk_options = {}) const;
   TreeErrors compare(const std::vector<View>& shown, const std::vector<View>& truth) const;
 
   SlabTree tree_;
@@ -84,6 +92,7 @@ struct SlabValidation {
   std::vector<std::string> notes;
   double truth_error = 0.0;
   SlabTree tree;
+  TreeJudge::ExactStatistics exact;
 
   /// contract.md's {"levels": …}: those of the fitted rules in Substrate's order; the other strategies beside them.
   Json json(const Json& provenance) const;

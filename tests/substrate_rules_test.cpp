@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "models/substrate/conversions.h"
+#include "models/substrate/regime.h"
 #include "reference/render.h"
 #include "reference/substrate/tree_albedo.h"
 #include "reference/substrate/tree_json.h"
@@ -322,6 +323,61 @@ TEST(Validation, SameBitsTwice) {
   const ValidationOptions options{.brdf_samples = 64, .albedo_paths = 1024, .spheres = false};
   EXPECT_EQ(validate_tree(tree, shipped(), options, monitor).json({}),
             validate_tree(tree, shipped(), options, monitor).json({}));
+}
+
+TEST(ClosureSelection, IsUnbiasedAndItsVarianceIsWhatItSays) {
+  const std::vector<Closure> closures = walk(read_tree((data / "substrate/car_paint.json").string()));
+  const Direction wo = view_at(35.0), wi = direction(radians(50.0), radians(160.0));
+  const ClosureSelection selection = ClosureSelection::of(closures, wo);
+  ASSERT_EQ(selection.probabilities.size(), 3u);
+  double probability_sum = 0.0, sum = 0.0, squares = 0.0;
+  for (const double probability : selection.probabilities) probability_sum += probability;
+  EXPECT_NEAR(probability_sum, 1.0, 1e-12);
+  // Every chance of [0, 1) in turn: what choose() does, averaged.
+  constexpr int draws = 100000;
+  for (int i = 0; i < draws; ++i) {
+    const std::size_t k = selection.choose((i + 0.5) / draws);
+    const double estimate = closures[k].evaluate(wi, wo).x / selection.probabilities[k];
+    sum += estimate / draws;
+    squares += estimate * estimate / draws;
+  }
+  const double f = evaluate(closures, wi, wo).x;
+  EXPECT_NEAR(sum, f, 1e-4 * f);
+  EXPECT_NEAR(selection.variance(closures, wi, wo).x, squares - sum * sum, 1e-3 * squares);
+  EXPECT_GT(selection.variance(closures, wi, wo).x, 0.0);
+  // In a furnace the choice by albedo costs nothing: every closure's estimate is the whole albedo.
+  const std::vector<Rgb> albedos = closure_albedos(closures, wo);
+  const double whole = mean_channel(directional_albedo(closures, wo));
+  for (std::size_t k = 0; k < closures.size(); ++k) {
+    EXPECT_NEAR(mean_channel(albedos[k]) / selection.probabilities[k], whole, 1e-9);
+  }
+}
+
+TEST(Regimes, FollowMeanFreePathThicknessAndPixel) {
+  SlabValues skin = default_slab();
+  skin.mean_free_path = {0.1, 0.05, 0.02};
+  EXPECT_EQ(regime_of(skin, true, 1.0), Regime::opaque_diffuse);
+  EXPECT_EQ(regime_of(skin, true, 0.01), Regime::optically_thick);
+  skin.thickness = 0.05;
+  EXPECT_EQ(regime_of(skin, false, 1.0), Regime::optically_thin);
+  skin.thickness = 10.0;  // nothing passes: as if it were the lowest
+  EXPECT_EQ(regime_of(skin, false, 1.0), Regime::opaque_diffuse);
+  skin.thickness = 0.05;
+  skin.diffuse_albedo = {0.0, 0.0, 0.0};
+  EXPECT_EQ(regime_of(skin, false, 1.0), Regime::translucent);
+}
+
+TEST(Statistics, ExactOnesNeedMoreClosuresUnderPartialCoverage) {
+  Monitor monitor;
+  const SlabTree tree = read_tree((data / "substrate/worn_car_paint.json").string());
+  const TreeJudge judge(tree, shipped(), {.brdf_samples = 32, .albedo_paths = 1024, .spheres = false}, monitor);
+  const TreeJudge::ExactStatistics exact = judge.exact_statistics();
+  EXPECT_GT(exact.closures, walk(tree).size());
+  EXPECT_GT(exact.difference.error(), 0.0);
+  // Where all is covered there is one outcome.
+  const SlabTree whole = read_tree((data / "substrate/coated_diffuse.json").string());
+  const TreeJudge same(whole, shipped(), {.brdf_samples = 32, .albedo_paths = 1024, .spheres = false}, monitor);
+  EXPECT_NEAR(same.exact_statistics().difference.error(), 0.0, 1e-9);
 }
 
 TEST(RuleFiles, SayWhatIsWrong) {

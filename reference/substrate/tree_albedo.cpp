@@ -37,4 +37,33 @@ Rgb directional_albedo(const std::vector<Closure>& closures, const Direction& wo
   return sum;
 }
 
+ClosureSelection ClosureSelection::of(const std::vector<Closure>& closures, const Direction& wo, int steps) {
+  ClosureSelection selection;
+  double sum = 0.0;
+  for (const Rgb& albedo : closure_albedos(closures, wo, steps)) {
+    selection.probabilities.push_back(mean_channel(albedo));
+    sum += selection.probabilities.back();
+  }
+  for (double& probability : selection.probabilities) {
+    probability = sum > 0.0 ? probability / sum : 1.0 / static_cast<double>(closures.size());
+  }
+  return selection;
+}
+
+std::size_t ClosureSelection::choose(double u) const {
+  std::size_t chosen = 0;
+  while (chosen + 1 < probabilities.size() && u >= probabilities[chosen]) u -= probabilities[chosen++];
+  return chosen;
+}
+
+Rgb ClosureSelection::variance(const std::vector<Closure>& closures, const Direction& wi, const Direction& wo) const {
+  Rgb squares{0.0, 0.0, 0.0}, sum{0.0, 0.0, 0.0};
+  for (std::size_t k = 0; k < closures.size(); ++k) {
+    const Rgb f = closures[k].evaluate(wi, wo);
+    sum = sum + f;
+    if (probabilities[k] > 0.0) squares = squares + f * f * (1.0 / probabilities[k]);
+  }
+  return squares - sum * sum;
+}
+
 }  // namespace lobefit
