@@ -216,8 +216,8 @@ struct ThinScattering {
 template <class T, class G>
 LOBEFIT_TEXT Vec3<T> thin_scattering(const Vec3<T>& single_scattering_albedo, const Vec3<T>& optical_depth, const T& g,
                                      const Geometry<G>& geometry) {
-  const T cos_theta_i = geometry.cos_theta_i, cos_theta_o = geometry.cos_theta_o;
-  const T cos_light_view = geometry.cos_light_view;
+  const T cos_theta_i = T(geometry.cos_theta_i), cos_theta_o = T(geometry.cos_theta_o);
+  const T cos_light_view = T(geometry.cos_light_view);
   return {
       call<ThinScattering>(single_scattering_albedo.x, optical_depth.x, g, cos_theta_i, cos_theta_o, cos_light_view),
       call<ThinScattering>(single_scattering_albedo.y, optical_depth.y, g, cos_theta_i, cos_theta_o, cos_light_view),
