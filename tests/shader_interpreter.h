@@ -168,9 +168,9 @@ class TextInterpreter {
     return run(function, variables);
   }
 
-  /// The members that a function without arguments gives to the struct it returns.
-  Variables members(const std::string& name) {
-    Variables variables;
+  /// The variables of a function that returns a struct p, its members `p.alpha`, … among them. `variables` are its
+  /// arguments, those of structs as their members.
+  Variables members(const std::string& name, Variables variables = {}) {
     run(functions_.at(name), variables);
     return variables;
   }
@@ -250,7 +250,13 @@ class TextInterpreter {
         if (accept(";")) continue;
       }
       expect("=");
-      variables[name] = ternary(variables);
+      if (functions_.contains(tokens_.at(at_)) && tokens_.at(at_ + 1) == "(" && tokens_.at(at_ + 2) == ")") {
+        // A struct, from a function without arguments.
+        for (const auto& [member, value] : members(next())) variables[name + member.substr(1)] = value;
+        at_ += 2;
+      } else {
+        variables[name] = ternary(variables);
+      }
       expect(";");
     }
     ShaderValue result;

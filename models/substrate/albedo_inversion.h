@@ -27,18 +27,41 @@ struct SemiInfiniteAlbedo {
   }
 };
 
-/// ω in [0, 1] of the semi-infinite medium that returns the share ρ in [0, 1]; g in (-1, 1).
+/// s² in [0, 1] of the semi-infinite medium that returns the share ρ in [0, 1].
+struct SemiInfiniteSimilarity {
+  static constexpr const char* name = "semi_infinite_similarity";
+  static constexpr std::array arguments{"albedo"};
+
+  template <class T>
+  LOBEFIT_TEXT static T evaluate(const T& albedo) {
+    const T rho = let("rho", saturate(albedo));
+    const T b = let("b", 1.139 + 1.17 * rho);
+    const T s = let("s", 2.0 * (1.0 - rho) / (b + sqrt(b * b - 0.556 * (1.0 - rho))));
+    return min(s * s, 1.0);
+  }
+};
+
+/// ω in [0, 1] of that medium; g in (-1, 1).
 struct SingleScatteringAlbedo {
   static constexpr const char* name = "single_scattering_albedo";
   static constexpr std::array arguments{"albedo", "g"};
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const T& albedo, const T& g) {
-    const T rho = let("rho", saturate(albedo));
-    const T b = let("b", 1.139 + 1.17 * rho);
-    const T s = let("s", 2.0 * (1.0 - rho) / (b + sqrt(b * b - 0.556 * (1.0 - rho))));
-    const T s2 = let("s2", min(s * s, 1.0));
+    const T s2 = let("s2", call<SemiInfiniteSimilarity>(albedo));
     return (1.0 - s2) / (1.0 - g * s2);
+  }
+};
+
+/// 1 - ω of that medium. Of a white one float has no digits left in ω.
+struct SingleScatteringAbsorption {
+  static constexpr const char* name = "single_scattering_absorption";
+  static constexpr std::array arguments{"albedo", "g"};
+
+  template <class T>
+  LOBEFIT_TEXT static T evaluate(const T& albedo, const T& g) {
+    const T s2 = let("s2", call<SemiInfiniteSimilarity>(albedo));
+    return (1.0 - g) * s2 / (1.0 - g * s2);
   }
 };
 

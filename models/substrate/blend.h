@@ -137,12 +137,25 @@ struct TwoStreams {
     const T sum = let("sum", absorbed + scattered);
     const T root = let("root", sqrt(absorbed * (absorbed + 2.0 * scattered) + 1e-8));
     const T decay = let("decay", exp(-root));
-    const T scale = let("scale", 1.0 / (root + sum + (root - sum) * decay * decay));
-    return {scattered * (1.0 - decay * decay) * scale, 2.0 * root * decay * scale};
+    // 1 - decay², whose digits float would lose where little is absorbed.
+    const T lost = let("lost", 2.0 * root * (1.0 + decay * decay) / (2.0 + call<CothExcess>(T(2.0 * root))));
+    const T scale = let("scale", 1.0 / (root * (1.0 + decay * decay) + sum * lost));
+    return {scattered * lost * scale, 2.0 * root * decay * scale};
   }
   /// Over a bottom of this albedo.
   LOBEFIT_TEXT T over(const T& albedo) const {
     return reflected + passed * passed * albedo / (1.0 - min(reflected * albedo, 0.9999));
+  }
+};
+
+/// The two as one function of the shader.
+struct TwoStreamsOver {
+  static constexpr const char* name = "two_streams_over";
+  static constexpr std::array arguments{"absorbed", "scattered", "albedo"};
+
+  template <class T>
+  LOBEFIT_TEXT static T evaluate(const T& absorbed, const T& scattered, const T& albedo) {
+    return TwoStreams<T>::of(absorbed, scattered).over(albedo);
   }
 };
 
@@ -380,37 +393,42 @@ struct FittedBlend {
     // The medium.
     Vec3<T> depth = slab_depth(top);
     Vec3<T> scattering = single_scattering_albedo(top.diffuse_albedo, top.phase_anisotropy);
+    Vec3<T> absorption = each_channel(top.diffuse_albedo, [&](const T& albedo) {
+      return T(call<SingleScatteringAbsorption>(albedo, top.phase_anisotropy));
+    });
     const T sine2 = let("sine2", T(1.0 - square(cos_theta_o)) / square(n));
     const T view_path = let("view_path", min(1.0 / sqrt(max(1.0 - sine2, 1e-3)), 8.0));
     // Slabs have Schlick's Fresnel term, interfaces the real one.
-    const T schlick = let("schlick", call<SchlickFresnel>(cos_theta_o, f0, T(1.0)));
+    // Not a call: the slab's own shader has the function for colours, and a shader has one text per function.
+    const T schlick = let("schlick", SchlickFresnel::evaluate(cos_theta_o, f0, T(1.0)));
     const T excess = let("excess", select(f0 > 1e-4, call<DielectricFresnel>(cos_theta_o, n) - schlick, T(0.0)));
     Vec3<T> coat = Slab::specular_albedo(top, cos_theta_o) + excess * exp(-c.rough_fresnel * alpha);
     const T crossed =
         let("crossed", lerp(f0, inside, T(1.0 - exp(-(c.trapping * bottom_alpha + c.top_trapping * alpha)))));
     const T lobe_path = let("lobe_path", lerp(view_path, c.lobe_path, T(saturate(bottom_alpha + alpha))));
-    const auto through = [&](const T& tau, const T& omega, const T& albedo, const T& path) {
-      const T kept = T(1.0 - omega * top.phase_anisotropy);
-      const T reduced = tau * kept;
-      const T reduced_omega = omega * (1.0 - top.phase_anisotropy) / max(kept, 1e-6);
-      return TwoStreams<T>::of(T(path * (1.0 - reduced_omega) * reduced), T(c.scattering * reduced_omega * reduced))
-          .over(albedo);
+    const auto through = [&](const T& tau, const T& omega, const T& absorbed, const T& albedo, const T& path) {
+      // (1 - ω') τ' and ω' τ'.
+      return T(call<TwoStreamsOver>(T(path * (absorbed * tau)),
+                                    T(c.scattering * (omega * (1.0 - top.phase_anisotropy) * tau)), albedo));
     };
-    const auto channel = [&](const T& tau, const T& omega, const T& albedo, const T& f, T& specular, T& diffuse) {
-      const T direct = exp(-tau * (view_path + lobe_path));
-      specular = (1.0 - crossed) * f * direct / (1.0 - min(crossed * f * direct, 0.9999));
-      const T path = lerp(T(0.5 * (view_path + c.light_path)), c.milky_path, omega);
-      const T both = min(albedo + f, 0.9999);
+    Vec3<T> direct = each_channel(depth, [&](const T& tau) { return T(exp(-tau * (view_path + lobe_path))); });
+    const auto lobe_through = [&](const T& f, const T& passed) {
+      return T((1.0 - crossed) * f * passed / (1.0 - min(crossed * f * passed, 0.9999)));
+    };
+    const auto body_through = [&](const T& tau, const T& omega, const T& absorbed, const T& albedo, const T& f,
+                                  const T& passed) {
+      const T path = let("path", lerp(T(0.5 * (view_path + c.light_path)), c.milky_path, omega));
+      const T both = let("both", min(albedo + f, 0.9999));
       // Without scattering this is the body alone: the lobe went the same way.
-      const T lobe = f * lerp(T(exp(-2.0 * path * tau)), direct, omega);
-      const T out = max(through(tau, omega, both, path) - lobe, 0.0);
-      const T back = through(tau, omega, both, c.inside_path);
-      diffuse = (1.0 - inside) * out / (1.0 - min(inside * back, 0.9999));
+      const T lobe = let("lobe", f * lerp(T(exp(-2.0 * path * tau)), passed, omega));
+      const T out = let("out", max(through(tau, omega, absorbed, both, path) - lobe, 0.0));
+      const T back = let("back", through(tau, omega, absorbed, both, c.inside_path));
+      return T((1.0 - inside) * out / (1.0 - min(inside * back, 0.9999)));
     };
-    Vec3<T> specular, diffuse;
-    channel(depth.x, scattering.x, body.x, reflectance.x, specular.x, diffuse.x);
-    channel(depth.y, scattering.y, body.y, reflectance.y, specular.y, diffuse.y);
-    channel(depth.z, scattering.z, body.z, reflectance.z, specular.z, diffuse.z);
+    Vec3<T> specular = each_channel(reflectance, direct, lobe_through);
+    Vec3<T> diffuse{body_through(depth.x, scattering.x, absorption.x, body.x, reflectance.x, direct.x),
+                    body_through(depth.y, scattering.y, absorption.y, body.y, reflectance.y, direct.y),
+                    body_through(depth.z, scattering.z, absorption.z, body.z, reflectance.z, direct.z)};
     specular = specular * (1.0 - coat);
 
     const T light_top = let("light_top", mean_of_channels(coat));

@@ -1,0 +1,75 @@
+// The parts that shader texts are made of, in one language.
+#pragma once
+
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "evaluate/shader.h"
+
+namespace lobefit {
+
+struct ShaderLanguage {
+  std::string_view name;
+  std::string_view vector;  // type of three floats
+  std::string_view lerp;
+  bool has_saturate;
+  bool has_initializer_lists;
+};
+
+/// Throws Error(usage) for an unknown name.
+const ShaderLanguage& find_shader_language(std::string_view name);
+
+/// Shortest decimal that reads back as the same float.
+std::string literal_text(double value);
+
+/// The constants and guards before everything else.
+std::string shader_prologue();
+
+/// A struct of the parameters; once where several texts are joined.
+std::string struct_text(const ShaderLanguage& language, const std::string& name,
+                        std::span<const ShaderParameter> parameters);
+
+/// The function of no arguments that returns the struct `type` with these values.
+std::string values_text(const ShaderLanguage& language, const std::string& type, const std::string& function,
+                        std::span<const ShaderParameter> parameters);
+
+/// The tables and the functions that the shader's results need, callees first.
+std::string definitions_text(const ShaderLanguage& language, const Shader& shader);
+
+/// Prints the statements that compute some nodes, each value once.
+class StatementPrinter {
+ public:
+  /// `taken`: names that no local may have.
+  StatementPrinter(const ShaderLanguage& language, std::span<const ShaderNode* const> results,
+                   std::span<const std::string> taken);
+
+  const std::string& statements() const { return statements_; }
+  /// The expression of a result, after the statements.
+  std::string text(const ShaderNode& node) const { return text(node, ternary); }
+
+ private:
+  /// Binding strength, so that parentheses stand just where the graph needs them.
+  enum Precedence { ternary, comparison, sum, product, unary, primary };
+
+  void collect(const ShaderNode* node, std::vector<const ShaderNode*>& reachable);
+  void define(const ShaderNode* node, const std::string& wanted);
+  std::string type(ShaderType type) const;
+  std::string text(const ShaderNode& node, Precedence outer) const;
+  std::string list(const ShaderNode& node) const;
+
+  const ShaderLanguage& language_;
+  std::map<const ShaderNode*, int> uses_;
+  std::map<const ShaderNode*, std::string> names_;
+  std::set<std::string> taken_;
+  std::string statements_;
+  int temporaries_ = 0;
+};
+
+/// The statements of a function that returns one value.
+std::string body_text(const ShaderLanguage& language, const ShaderFunction& function);
+
+}  // namespace lobefit
