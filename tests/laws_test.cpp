@@ -319,7 +319,7 @@ double fibre_albedo(const Model& model, std::span<const double> flat, double sin
 /// Default parameters with the colours that scale a model at 1.
 std::vector<double> white_defaults(const Model& model) {
   ParameterValues values = model.defaults();
-  for (const char* name : {"albedo", "base_color", "color"}) {
+  for (const char* name : {"albedo", "base_color", "color", "diffuse_albedo"}) {
     if (values.has(name)) values.set(name, 1.0);
   }
   return to_vector(values.flat());

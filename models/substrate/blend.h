@@ -384,25 +384,25 @@ struct FittedBlend {
     const T from_above = let("from_above", select(ratio > 1.0, thin_side, between));
     const T from_below = let("from_below", select(ratio > 1.0, T(diffuse_fresnel_inside(denser)), thin_side));
     const T bottom_keeps = let("bottom_keeps", 1.0 - call<GgxAverageLoss>(bottom_alpha));
-    Vec3<T> reflectance = bottom.f0 * metal + between * (1.0 - metal);
-    reflectance = reflectance * (bottom_keeps + reflectance * (1.0 - bottom_keeps));
-    Vec3<T> bare = bottom.diffuse_albedo / ((1.0 - own_inside) + own_inside * bottom.diffuse_albedo);
-    Vec3<T> body = bare * ((1.0 - from_above) * (1.0 - from_below)) / (1.0 - bare * from_below) +
-                   max(from_above - between, 0.0) * (1.0 - metal);
+    Vec3<T> facets = let("facets", bottom.f0 * metal + between * (1.0 - metal));
+    Vec3<T> reflectance = let("reflectance", facets * (bottom_keeps + facets * (1.0 - bottom_keeps)));
+    Vec3<T> bare = let("bare", bottom.diffuse_albedo / ((1.0 - own_inside) + own_inside * bottom.diffuse_albedo));
+    Vec3<T> body = let("body", bare * ((1.0 - from_above) * (1.0 - from_below)) / (1.0 - bare * from_below) +
+                                   max(from_above - between, 0.0) * (1.0 - metal));
 
     // The medium.
-    Vec3<T> depth = slab_depth(top);
-    Vec3<T> scattering = single_scattering_albedo(top.diffuse_albedo, top.phase_anisotropy);
-    Vec3<T> absorption = each_channel(top.diffuse_albedo, [&](const T& albedo) {
-      return T(call<SingleScatteringAbsorption>(albedo, top.phase_anisotropy));
-    });
+    Vec3<T> depth = let("depth", slab_depth(top));
+    Vec3<T> scattering = let("scattering", single_scattering_albedo(top.diffuse_albedo, top.phase_anisotropy));
+    Vec3<T> absorption = let("absorption", each_channel(top.diffuse_albedo, [&](const T& albedo) {
+                               return T(call<SingleScatteringAbsorption>(albedo, top.phase_anisotropy));
+                             }));
     const T sine2 = let("sine2", T(1.0 - square(cos_theta_o)) / square(n));
     const T view_path = let("view_path", min(1.0 / sqrt(max(1.0 - sine2, 1e-3)), 8.0));
     // Slabs have Schlick's Fresnel term, interfaces the real one.
     // Not a call: the slab's own shader has the function for colours, and a shader has one text per function.
     const T schlick = let("schlick", SchlickFresnel::evaluate(cos_theta_o, f0, T(1.0)));
     const T excess = let("excess", select(f0 > 1e-4, call<DielectricFresnel>(cos_theta_o, n) - schlick, T(0.0)));
-    Vec3<T> coat = Slab::specular_albedo(top, cos_theta_o) + excess * exp(-c.rough_fresnel * alpha);
+    Vec3<T> coat = let("coat", Slab::specular_albedo(top, cos_theta_o) + excess * exp(-c.rough_fresnel * alpha));
     const T crossed =
         let("crossed", lerp(f0, inside, T(1.0 - exp(-(c.trapping * bottom_alpha + c.top_trapping * alpha)))));
     const T lobe_path = let("lobe_path", lerp(view_path, c.lobe_path, T(saturate(bottom_alpha + alpha))));
@@ -411,7 +411,8 @@ struct FittedBlend {
       return T(call<TwoStreamsOver>(T(path * (absorbed * tau)),
                                     T(c.scattering * (omega * (1.0 - top.phase_anisotropy) * tau)), albedo));
     };
-    Vec3<T> direct = each_channel(depth, [&](const T& tau) { return T(exp(-tau * (view_path + lobe_path))); });
+    Vec3<T> direct =
+        let("direct", each_channel(depth, [&](const T& tau) { return T(exp(-tau * (view_path + lobe_path))); }));
     const auto lobe_through = [&](const T& f, const T& passed) {
       return T((1.0 - crossed) * f * passed / (1.0 - min(crossed * f * passed, 0.9999)));
     };
