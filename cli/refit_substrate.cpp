@@ -4,7 +4,10 @@
 #include <iostream>
 
 #include "cli/output_folder.h"
+#include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
+#include "evaluate/shader.h"
+#include "evaluate/substrate_shader.h"
 #include "fit/substrate_rules.h"
 #include "reference/output_file.h"
 #include "reference/render.h"
@@ -318,6 +321,14 @@ fs::path data_folder() {
 }
 fs::path shipped_rules() { return data_folder() / "substrate_rules.json"; }
 
+std::string rules_shader(const std::string& language, const RuleConstants& constants, const std::string& command) {
+  const std::vector<std::string> provenance{
+      "Rules that make one Substrate slab of two, for the view that the base pass knows.",
+      "Made by `" + command + "`, lobefit " LOBEFIT_VERSION ".",
+      "Formulas and intervals: docs/substrate_rules.md of lobefit."};
+  return blend_shader(language, constants, provenance);
+}
+
 void refit_substrate_rules(const fs::path& path, const std::string& output, bool resume, const Context& context) {
   const RuleRecipe recipe = RuleRecipe::read(path);
   const fs::path destination = output.empty() ? fs::path("out") / recipe.name : fs::path(output);
@@ -393,6 +404,9 @@ void refit_substrate_rules(const fs::path& path, const std::string& output, bool
   write("substrate_rules.json", rules.dump(2) + "\n");
   write("result.json", document.dump(2) + "\n");
   write("result.md", rules_page(recipe, solution, scores, mixes, trees, budget_scores, conclusion, context.command));
+  for (const std::string& language : shader_languages()) {
+    write(("substrate_rules." + language).c_str(), rules_shader(language, constants, context.command));
+  }
   for (const char* name : {"trees.svg", "trees.png"}) {
     write_figure(trees_figure(budget_scores), folder.path(name), true, {.width = 800, .height = 520});
   }

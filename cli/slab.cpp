@@ -6,7 +6,9 @@
 
 #include "cli/arguments.h"
 #include "cli/output_folder.h"
+#include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
+#include "evaluate/shader.h"
 #include "evaluate/substrate_storage_error.h"
 #include "fit/substrate_rules.h"
 #include "models/substrate/regime.h"
@@ -398,6 +400,27 @@ void add_validate(CLI::App& slab, Context& context) {
   });
 }
 
+void add_shader(CLI::App& slab, Context& context) {
+  CLI::App* verb = slab.add_subcommand(
+      "shader",
+      "Shader code of the rules that make one slab of two\n"
+      "Lobefit_BlendVertical, Lobefit_BlendHorizontal and the same with Haze, on the parameter struct of\n"
+      "`lobefit export slab`; both texts may stand in one shader.");
+  struct Arguments {
+    std::string language = "hlsl", rules, output;
+  };
+  const auto a = std::make_shared<Arguments>();
+  verb->add_option("--lang", a->language, "Shader language")
+      ->check(CLI::IsMember(shader_languages()))
+      ->capture_default_str();
+  verb->add_option("--rules", a->rules, "Rule file (default: the shipped data/substrate_rules.json)");
+  verb->add_option("-o,--output", a->output, "File (default: stdout)");
+  verb->callback([&context, a] {
+    const RuleConstants constants = read_rules(a->rules.empty() ? shipped_rules() : fs::path(a->rules));
+    write_or_print(rules_shader(a->language, constants, context.command), a->output, context.force);
+  });
+}
+
 }  // namespace
 
 void add_slab(CLI::App& app, Context& context) {
@@ -414,6 +437,7 @@ void add_slab(CLI::App& app, Context& context) {
   add_slab_eval(*verb, context);
   add_simplify(*verb, context);
   add_validate(*verb, context);
+  add_shader(*verb, context);
   for (CLI::App* part : verb->get_subcommands([](const CLI::App*) { return true; })) {
     part->fallthrough();
     const std::string description = part->get_description();

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "cli/arguments.h"
+#include "models/substrate/blend.h"
 
 namespace lobefit {
 
@@ -11,6 +12,10 @@ namespace lobefit {
 std::filesystem::path data_folder();
 /// data/substrate_rules.json.
 std::filesystem::path shipped_rules();
+
+/// The rules as shader code, with a head that says where they came from.
+std::string rules_shader(const std::string& language, const FittedBlend::Constants<double>& constants,
+                         const std::string& command);
 
 /// lobefit refit substrate-rules.
 void refit_substrate_rules(const std::filesystem::path& recipe, const std::string& output, bool resume,

@@ -81,26 +81,27 @@ std::string blend_shader(std::string_view language_name, const FittedBlend::Cons
   const TracedSlab top = slab_input("top"), bottom = slab_input("bottom");
   const TracedSlab background = slab_input("background"), foreground = slab_input("foreground");
   const Expression share = input<Expression>("foreground_share"), cosine = input<Expression>("cos_theta_o");
-  std::array functions{BlendFunction{"Lobefit_BlendVertical",
-                                     "A slab on top of another, with one lobe.",
-                                     {"top", "bottom"},
-                                     {"cos_theta_o"},
-                                     FittedBlend::vertical(top, bottom, cosine, c)},
-                       BlendFunction{"Lobefit_BlendVerticalHaze",
-                                     "The same with two lobes: the top's, and the bottom's as the second.",
-                                     {"top", "bottom"},
-                                     {"cos_theta_o"},
-                                     FittedBlend::vertical<true>(top, bottom, cosine, c)},
-                       BlendFunction{"Lobefit_BlendHorizontal",
-                                     "Two slabs side by side, with one lobe; foreground_share from 0 to 1.",
-                                     {"background", "foreground"},
-                                     {"foreground_share", "cos_theta_o"},
-                                     FittedBlend::horizontal(background, foreground, share, cosine, c)},
-                       BlendFunction{"Lobefit_BlendHorizontalHaze",
-                                     "The same with two lobes: the background's, and the foreground's as the second.",
-                                     {"background", "foreground"},
-                                     {"foreground_share", "cos_theta_o"},
-                                     FittedBlend::horizontal<true>(background, foreground, share, cosine, c)}};
+  std::array functions{
+      BlendFunction{"Lobefit_BlendVertical",
+                    "A slab on top of another, with one lobe.",
+                    {"top", "bottom"},
+                    {"cos_theta_o"},
+                    FittedBlend::vertical(top, bottom, cosine, c)},
+      BlendFunction{"Lobefit_BlendVerticalHaze",
+                    "The same with two lobes: the top's, and the bottom's as the second.",
+                    {"top", "bottom"},
+                    {"cos_theta_o"},
+                    FittedBlend::vertical<LobeMerge::both>(top, bottom, cosine, c)},
+      BlendFunction{"Lobefit_BlendHorizontal",
+                    "Two slabs side by side, with one lobe; foreground_share from 0 to 1.",
+                    {"background", "foreground"},
+                    {"foreground_share", "cos_theta_o"},
+                    FittedBlend::horizontal(background, foreground, share, cosine, c)},
+      BlendFunction{"Lobefit_BlendHorizontalHaze",
+                    "The same with two lobes: the background's, and the foreground's as the second.",
+                    {"background", "foreground"},
+                    {"foreground_share", "cos_theta_o"},
+                    FittedBlend::horizontal<LobeMerge::both>(background, foreground, share, cosine, c)}};
   const Shader shader = trace.finish({});
 
   std::string text = "// Two Substrate slabs as one, by fitted rules.\n";

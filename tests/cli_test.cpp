@@ -365,6 +365,7 @@ TEST_F(CommandLine, SlabShowsEvaluatesSimplifiesAndValidates) {
   EXPECT_EQ(small["storage"]["bytes"], 12);
   EXPECT_EQ(small["closures"].size(), 1u);
   expect_refused("slab simplify slide_collapse --bytes 11", 2, {"bytes"});
+  EXPECT_NE(run("slab shader --lang glsl").out.find("Lobefit_BlendVertical"), std::string::npos);
 
   const Json validation = json("slab validate coated_metal --samples 32 -o out");
   ASSERT_GE(validation["levels"].size(), 2u);

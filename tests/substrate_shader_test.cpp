@@ -24,7 +24,7 @@ FittedBlend::Constants<double> random_constants(std::uint64_t seed) {
   UniformNumbers uniform(seed);
   FittedBlend::Constants<double> constants{};
   FittedBlend::describe(constants, [&](double& member, const ParameterInfo& info) {
-    // The gains are factors near 1: the widest would drive most albedos into their limits.
+    // Powers of means: the extremes leave the range of floats.
     const double share = info.lower == -3.0 && info.upper == 3.0 ? 0.1 : 1.0;
     const double middle = 0.5 * (info.lower + info.upper), half = 0.5 * (info.upper - info.lower);
     member = middle + share * half * (2.0 * uniform() - 1.0);
@@ -109,34 +109,34 @@ SlabValues widened(const Slab::Parameters<Single>& slab) {
   return unflatten<Slab, double, double>(flat);
 }
 
-template <bool haze>
+template <LobeMerge merge>
 std::array<Rule, 2> rules_with_lobes() {
   using C = FittedBlend::Constants<double>;
-  const std::string ending = haze ? "Haze" : "";
+  const std::string ending = merge == LobeMerge::both ? "Haze" : "";
   return {Rule{"Lobefit_BlendVertical" + ending,
                {"top", "bottom"},
                [](const SlabPair& s, const C& c) {
-                 return FittedBlend::vertical<haze>(s.first, s.second, s.cos_theta_o, c);
+                 return FittedBlend::vertical<merge>(s.first, s.second, s.cos_theta_o, c);
                },
                [](const SlabPair& s, const C& c) {
-                 return widened(FittedBlend::vertical<haze>(rounded(s.first), rounded(s.second), Single(s.cos_theta_o),
-                                                            rounded(c)));
+                 return widened(FittedBlend::vertical<merge>(rounded(s.first), rounded(s.second), Single(s.cos_theta_o),
+                                                             rounded(c)));
                }},
           Rule{"Lobefit_BlendHorizontal" + ending,
                {"background", "foreground"},
                [](const SlabPair& s, const C& c) {
-                 return FittedBlend::horizontal<haze>(s.first, s.second, s.share, s.cos_theta_o, c);
+                 return FittedBlend::horizontal<merge>(s.first, s.second, s.share, s.cos_theta_o, c);
                },
                [](const SlabPair& s, const C& c) {
-                 return widened(FittedBlend::horizontal<haze>(rounded(s.first), rounded(s.second), Single(s.share),
-                                                              Single(s.cos_theta_o), rounded(c)));
+                 return widened(FittedBlend::horizontal<merge>(rounded(s.first), rounded(s.second), Single(s.share),
+                                                               Single(s.cos_theta_o), rounded(c)));
                }}};
 }
 
 std::vector<Rule> rules() {
   std::vector<Rule> all;
-  for (const Rule& rule : rules_with_lobes<false>()) all.push_back(rule);
-  for (const Rule& rule : rules_with_lobes<true>()) all.push_back(rule);
+  for (const Rule& rule : rules_with_lobes<LobeMerge::mean>()) all.push_back(rule);
+  for (const Rule& rule : rules_with_lobes<LobeMerge::both>()) all.push_back(rule);
   return all;
 }
 
