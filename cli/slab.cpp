@@ -89,22 +89,16 @@ void print_packed(const std::vector<Closure>& closures) {
   const PackedMaterial packed = pack_material(stored);
   fmt::print("\nPacked into {} words{}\n", packed.words.size(),
              packed.storage.medium_words > 0 ? fmt::format(", {} of them of media", packed.storage.medium_words) : "");
-  const UnpackedMaterial read = unpack_material(packed.words);
-  double squares = 0.0;
-  std::size_t count = 0;
-  for (const double theta_o : {5.0, 30.0, 60.0}) {
-    for (const double theta_i : {5.0, 20.0, 40.0, 60.0, 75.0}) {
-      for (const double phi : {0.0, 90.0, 150.0, 180.0}) {
-        const Direction wo = direction(radians(theta_o), 0.0), wi = direction(radians(theta_i), radians(phi));
-        const Rgb a = closures_brdf(stored, {}, wi, wo), b = closures_brdf(read.closures, {}, wi, wo);
-        for (const auto& [x, y] : {std::pair{a.x, b.x}, std::pair{a.y, b.y}, std::pair{a.z, b.z}}) {
-          squares += square(std::log1p(20.0 * wi.z * std::max(x, 0.0)) - std::log1p(20.0 * wi.z * std::max(y, 0.0)));
-          ++count;
-        }
-      }
-    }
+  Table table;
+  table.grid = Grid::named_or_file("small");
+  table.channels = 3;
+  table.allocate();
+  const SubstrateStorageError error = substrate_storage_error(stored, unpack_material(packed.words).closures, table,
+                                                              entry_weights(table, {}, Quantity::log));
+  fmt::print("  quantisation: rms {:.2g} of log(1 + f cos)\n", error.total[static_cast<std::size_t>(Quantity::log)]);
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, error.alone.size()); ++i) {
+    fmt::print("    {:.2g} from {} of closure {}\n", error.alone[i].rms, error.alone[i].field, error.alone[i].closure);
   }
-  fmt::print("  quantisation: rms {:.2g} of log(1 + 20 f cos)\n", std::sqrt(squares / static_cast<double>(count)));
   for (const StorageLoss& loss : packed.losses) {
     fmt::print("  closure {}, {}: {}\n", loss.closure, loss.parameter, loss.words);
   }
