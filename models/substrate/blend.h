@@ -436,6 +436,7 @@ struct FittedBlend {
     const T light = let("light", mean_of_channels(specular));
     const T share = let("share", light / max(light + light_top, 1e-6));
     Slab::Parameters<T> result = lerp_slabs(top, bottom, share);
+    result.diffuse_model = bottom.diffuse_model;  // before set_light(), which asks for it
     const T wide = let("wide", c.stretch * log(n));
     const T blurred = let("blurred", sqrt(square(bottom_alpha * exp(wide)) + square(c.blur * (n - 1.0) * alpha)));
     merge_lobes<merge>(result, alpha, light_top, T(min(blurred, 1.0)), light, c.layer_power);
@@ -452,7 +453,6 @@ struct FittedBlend {
     Vec3<T> both_depths = at_most(depth + slab_depth(bottom), opaque_depth);
     result.thickness = top.thickness + bottom.thickness;
     result.mean_free_path = mean_free_path_of_depth(both_depths, result.thickness);
-    result.diffuse_model = bottom.diffuse_model;
     return result;
   }
 
