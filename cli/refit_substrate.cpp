@@ -111,7 +111,7 @@ RulePairs rule_pairs(const fs::path& folder, const std::string& name, const Rule
 }
 
 struct JudgedTree {
-  std::string name, title;
+  std::string name;
   SlabValidation validation;
 };
 
@@ -124,14 +124,12 @@ std::vector<JudgedTree> judge_trees(const RuleConstants& constants, const RuleRe
   std::ranges::sort(paths);
   std::vector<JudgedTree> trees;
   for (const fs::path& path : paths) {
-    const Json json = parse_json(read_file(path), path.string());
-    trees.push_back({path.stem().string(), json.value("title", path.stem().string()),
-                     validate_tree(tree_from_json(JsonReader(json, path.string())), constants,
-                                   {.brdf_samples = recipe.tree_samples,
-                                    .albedo_paths = 16 * recipe.tree_samples,
-                                    .seed = context.seed,
-                                    .spheres = false},
-                                   monitor)});
+    trees.push_back({path.stem().string(), validate_tree(read_tree(path), constants,
+                                                         {.brdf_samples = recipe.tree_samples,
+                                                          .albedo_paths = 16 * recipe.tree_samples,
+                                                          .seed = context.seed,
+                                                          .spheres = false},
+                                                         monitor)});
   }
   return trees;
 }

@@ -1,7 +1,6 @@
 // lobefit slab: Substrate trees, what they store, and what simplifying them costs.
 #include <fmt/format.h>
 
-#include <fstream>
 #include <iostream>
 
 #include "cli/arguments.h"
@@ -105,11 +104,6 @@ void print_packed(const std::vector<Closure>& closures) {
   for (const std::string& words : not_stored()) fmt::print("  never stored: {}\n", words);
 }
 
-std::string title_of(const fs::path& path) {
-  const Json json = parse_json(read_file(path), path.string());
-  return json.contains("title") && json["title"].is_string() ? json["title"].get<std::string>() : path.stem().string();
-}
-
 void add_show(CLI::App& slab, Context& context) {
   CLI::App* verb = slab.add_subcommand("show", "Topology, closures and bytes of a tree");
   struct Arguments {
@@ -132,7 +126,7 @@ void add_show(CLI::App& slab, Context& context) {
     const Json storage = closures.empty() ? Json{{"bytes", 4}} : storage_json(closures);
     if (!a->svg.empty()) {
       OutputFile file(a->svg, context.force);
-      file.write(tree_svg(tree, title_of(path)));
+      file.write(tree_svg(tree, tree.title));
       file.commit();
     }
     if (context.json) {
@@ -141,7 +135,7 @@ void add_show(CLI::App& slab, Context& context) {
       std::cout << Json{{"tree", tree_json(tree)}, {"closures", list}, {"storage", storage}}.dump(2) << "\n";
       return;
     }
-    fmt::print("{}\n{}\n", title_of(path), tree_text(tree));
+    fmt::print("{}\n{}\n", tree.title, tree_text(tree));
     fmt::print("{} closures, {} bytes per pixel{}\n", closures.size(), storage["bytes"].get<int>(),
                closures.empty() ? "" : ", layout " + storage["layout"].get<std::string>());
     WalkOptions exact;
@@ -149,15 +143,8 @@ void add_show(CLI::App& slab, Context& context) {
     const std::size_t all = walk(tree, exact).size();
     if (all > closures.size()) fmt::print("(exact statistics of all coverage events: {} closures)\n", all);
     fmt::print("\nMedia, for pixels {:g} cm wide:\n", a->pixel);
-    const SlabTree shaded = resolved(tree);
-    for (const TreeNode& node : shaded.nodes) {
-      if (node.kind != Operator::slab) continue;
-      // resolved() makes the lowest slabs opaque; how far light spreads in them is what the file says.
-      const bool lowest = is_opaque(node.slab);
-      const auto own = std::ranges::find(tree.nodes, node.path, &TreeNode::path);
-      const SlabValues& given = own == tree.nodes.end() ? node.slab : own->slab;
-      fmt::print("  {:<28} {}\n", node.name.empty() ? node.path : node.name,
-                 regime_names[static_cast<std::size_t>(regime_of(lowest ? given : node.slab, lowest, a->pixel))]);
+    for (const SlabRegime& slab_regime : regimes_of(tree, a->pixel)) {
+      fmt::print("  {:<28} {}\n", slab_regime.name, regime_names[static_cast<std::size_t>(slab_regime.regime)]);
     }
     if (a->packed) print_packed(closures);
     if (!a->fields || closures.empty()) return;
@@ -361,7 +348,6 @@ void add_validate(CLI::App& slab, Context& context) {
                                            {"diffuse_reading", a->reading},
                                            {"tree_sha256", sha256_of_file(path)},
                                            {"rules_sha256", sha256_of_file(rules)}});
-    const std::string title = title_of(path);
     if (folder) {
       const auto write = [&](const char* name, const std::string& text) {
         OutputFile file(folder->path(name), true);
@@ -369,10 +355,10 @@ void add_validate(CLI::App& slab, Context& context) {
         file.commit();
       };
       write("validation.json", document.dump(2) + "\n");
-      write("validation.md", validation.page(title, context.command));
-      write("tree.svg", tree_svg(tree, title));
+      write("validation.md", validation.page(tree.title, context.command));
+      write("tree.svg", tree_svg(tree, tree.title));
       for (const char* name : {"error.svg", "error.png"}) {
-        write_figure(validation.figure(title), folder->path(name), true, {.width = 1000, .height = 520});
+        write_figure(validation.figure(tree.title), folder->path(name), true, {.width = 1000, .height = 520});
       }
       folder->commit();
     }
@@ -380,7 +366,7 @@ void add_validate(CLI::App& slab, Context& context) {
       std::cout << document.dump(2) << "\n";
       return;
     }
-    fmt::print("{}\n  {:<13} {:>5} {:>8}  {:>14}  {:>8}   (model: brdf, albedo; truth known to {:.2g})\n", title,
+    fmt::print("{}\n  {:<13} {:>5} {:>8}  {:>14}  {:>8}   (model: brdf, albedo; truth known to {:.2g})\n", tree.title,
                "strategy", "bytes", "closures", "simplification", "model", validation.truth_error);
     for (const ValidatedStrategy& strategy : validation.strategies) {
       for (const ValidatedStage& stage : strategy.stages) {

@@ -89,6 +89,18 @@ template <LobeMerge merge, class T>
   return FittedBlend::horizontal<merge>(background, foreground, mix, cos_theta_o, c);
 }
 
+/// What a mix looks like: the mix of both. [view][light]
+std::vector<Rgb> mix_truth(const SlabValues& background, const SlabValues& foreground, double mix) {
+  std::vector<Rgb> truth;
+  const Directions& directions = Directions::get();
+  for (const Direction& wo : directions.views) {
+    for (const Direction& wi : directions.lights) {
+      truth.push_back(lerp(opaque_brdf<double>(background, wi, wo), opaque_brdf<double>(foreground, wi, wo), mix));
+    }
+  }
+  return truth;
+}
+
 /// Directional albedo of an opaque slab: the interface by its table, the body by quadrature.
 template <class T>
 Vec3<T> slab_albedo(const Slab::Parameters<T>& slab, const Direction& wo) {
@@ -123,9 +135,10 @@ class RuleProblem {
       first_.push_back(count_);
       count_ += variants * 3 * (views + (uses_brdf(pairs.layers[i]) ? views * lights : 0));
     }
-    for (std::size_t i = 0; i < pairs.mixes.size(); ++i) {
+    for (const MixedPair& pair : pairs.mixes) {
       first_.push_back(count_);
       count_ += variants * 3 * views * lights;
+      mix_truths_.push_back(mix_truth(prepared(pair.background), prepared(pair.foreground), pair.mix));
     }
     first_.push_back(count_);
   }
@@ -211,18 +224,18 @@ class RuleProblem {
     const Slab::Parameters<T> a = promoted<T>(background), b = promoted<T>(foreground);
     const Directions& directions = Directions::get();
     const double weight = std::sqrt(1.0 / static_cast<double>(3 * directions.views.size() * directions.lights.size()));
+    auto truth = mix_truths_[number].begin();
     for (const Direction& wo : directions.views) {
       const Slab::Parameters<T> slab = mixed_slab<merge, T>(a, b, T(pair.mix), wo.z, c);
       for (const Direction& wi : directions.lights) {
-        const Rgb truth =
-            lerp(opaque_brdf<double>(background, wi, wo), opaque_brdf<double>(foreground, wi, wo), pair.mix);
-        compare(opaque_brdf<T>(slab, wi, wo), truth, wi.z, weight, out);
+        compare(opaque_brdf<T>(slab, wi, wo), *truth++, wi.z, weight, out);
       }
     }
   }
 
   const RulePairs& pairs_;
   RuleFitOptions options_;
+  std::vector<std::vector<Rgb>> mix_truths_;
   std::vector<std::size_t> first_;
   std::size_t count_ = 0;
 };
@@ -319,9 +332,10 @@ std::vector<RuleScore> score_rules(const RulePairs& pairs, const RuleConstants& 
     LayeredPair pair = pairs.layers[i];
     pair.top.diffuse_model = pair.bottom.diffuse_model = options.diffuse_model;
     const std::vector<Closure> closures = walk(pair.tree());
+    const SlabValues blended = BaselineBlend::vertical(pair.top, pair.bottom);  // whatever the view
     for (std::size_t v = 0; v < views; ++v) {
       const Direction& wo = directions.views[v];
-      const SlabValues slabs[] = {BaselineBlend::vertical(pair.top, pair.bottom),
+      const SlabValues slabs[] = {blended,
                                   layered_slab<LobeMerge::mean, double>(pair.top, pair.bottom, wo.z, constants),
                                   layered_slab<LobeMerge::both, double>(pair.top, pair.bottom, wo.z, constants)};
       const Rgb shown[ways] = {slab_albedo(slabs[0], wo), directional_albedo(closures, wo), slab_albedo(slabs[1], wo),
@@ -365,23 +379,25 @@ MixScore score_mixes(const RulePairs& pairs, const RuleConstants& constants, con
   for (const MixedPair& drawn : pairs.mixes) {
     MixedPair pair = drawn;
     pair.background.diffuse_model = pair.foreground.diffuse_model = options.diffuse_model;
+    const SlabValues &a = pair.background, &b = pair.foreground;
+    const std::vector<Rgb> truths = mix_truth(a, b, pair.mix);
     for (std::size_t way = 0; way < 3; ++way) {
       double sum = 0.0;
       std::size_t count = 0;
+      auto truth = truths.begin();
       for (const Direction& wo : directions.views) {
-        const SlabValues &a = pair.background, &b = pair.foreground;
         const SlabValues slab = way == 0   ? BaselineBlend::horizontal(a, b, pair.mix)
                                 : way == 1 ? mixed_slab<LobeMerge::mean, double>(a, b, pair.mix, wo.z, constants)
                                            : mixed_slab<LobeMerge::both, double>(a, b, pair.mix, wo.z, constants);
         for (const Direction& wi : directions.lights) {
-          const Rgb truth = lerp(opaque_brdf<double>(a, wi, wo), opaque_brdf<double>(b, wi, wo), pair.mix);
           const Rgb shown = opaque_brdf<double>(slab, wi, wo);
           const auto add = [&](double model, double reference) {
             const auto value = [&](double f) { return std::log1p(log_scale * wi.z * std::max(f, 0.0)); };
             sum += square(value(model) - value(reference));
             ++count;
           };
-          add(shown.x, truth.x), add(shown.y, truth.y), add(shown.z, truth.z);
+          add(shown.x, truth->x), add(shown.y, truth->y), add(shown.z, truth->z);
+          ++truth;
         }
       }
       rms[way].push_back(std::sqrt(sum / static_cast<double>(count)));

@@ -59,7 +59,7 @@ inline void set_haziness(SlabValues& slab, double haziness, double extent) {
 
 // ---- Unreal's older shading models ---------------------------------------------------------------------------------
 
-/// DefaultLit (and, where it goes with `subsurface_mean_free_path`, Subsurface): one slab.
+/// DefaultLit: one slab.
 inline int add_default_lit(SlabTree& tree, const Rgb& base_color, double metallic, double specular, double roughness,
                            double anisotropy = 0.0) {
   SlabValues slab = default_slab();

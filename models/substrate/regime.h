@@ -23,4 +23,25 @@ inline Regime regime_of(const SlabValues& slab, bool lowest, double pixel_footpr
   return largest_channel(slab.diffuse_albedo) > 0.0 ? Regime::optically_thin : Regime::translucent;
 }
 
+struct SlabRegime {
+  std::string name;  // the slab's, or its path
+  Regime regime;
+};
+
+/// Of every slab of a tree, operands before operators.
+inline std::vector<SlabRegime> regimes_of(const SlabTree& given, double pixel_footprint) {
+  // resolved() makes the lowest slabs opaque; how far light spreads in them is what they say themselves.
+  SlabTree thin = given;
+  thin.thin = true;
+  const SlabTree tree = resolved(given), own = resolved(thin);
+  std::vector<SlabRegime> regimes;
+  for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
+    const TreeNode& node = tree.nodes[i];
+    if (node.kind != Operator::slab) continue;
+    regimes.push_back({node.name.empty() ? node.path : node.name,
+                       regime_of(own.nodes[i].slab, is_opaque(node.slab), pixel_footprint)});
+  }
+  return regimes;
+}
+
 }  // namespace lobefit

@@ -33,6 +33,7 @@ struct SlabTree {
   /// A flat sheet (foliage, cloth): the lowest slab's medium is as thick as it says, and light passes. Else the
   /// geometry behind the surface makes it opaque (S2, slide 31).
   bool thin = false;
+  std::string title;  // for people
 
   const TreeNode& node(int index) const { return nodes[static_cast<std::size_t>(index)]; }
   TreeNode& node(int index) { return nodes[static_cast<std::size_t>(index)]; }
@@ -131,14 +132,6 @@ inline SlabTree resolved(const SlabTree& tree) {
   SlabTree result{.thin = tree.thin};
   result.root = detail::copy_resolved(tree, tree.root, !tree.thin, result, 0);
   return result;
-}
-
-/// Operators on the longest way from a node down to a slab: the engine collapses by it.
-inline int height(const SlabTree& tree, int index) {
-  const TreeNode& node = tree.node(index);
-  if (node.kind == Operator::slab) return 0;
-  const int first = height(tree, node.first);
-  return 1 + (node.second < 0 ? first : std::max(first, height(tree, node.second)));
 }
 
 }  // namespace lobefit

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <iterator>
-
 namespace lobefit {
 
 namespace {
@@ -229,16 +226,6 @@ LayerStack LayerStack::from_json(const JsonReader& reader) {
     }
   }
   return stack;
-}
-
-LayerStack LayerStack::read(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file.good() && !file.eof()) {
-    throw Error(ExitCode::invalid_input, "cannot read the layer stack", path, "check the path");
-  }
-  const Json json = parse_json(text, path);
-  return from_json(JsonReader(json, path));
 }
 
 std::vector<LayerEvent> LayerStack::events() const {

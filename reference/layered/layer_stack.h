@@ -94,8 +94,6 @@ struct LayerStack {
 
   /// Throws Error(invalid_input) with the path of what is wrong.
   static LayerStack from_json(const JsonReader& reader);
-  /// The same from a file.
-  static LayerStack read(const std::string& path);
 
   /// All outcomes of positive probability; the probabilities sum to 1.
   std::vector<LayerEvent> events() const;

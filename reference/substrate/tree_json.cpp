@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <iterator>
 #include <map>
 
 #include "models/substrate/conversions.h"
+#include "reference/output_file.h"
 
 namespace lobefit {
 
@@ -283,6 +282,7 @@ SlabTree tree_from_json(const JsonReader& reader) {
   for (const char* key : {"$schema", "title", "description"}) {
     if (reader.has(key)) reader.at(key).text();
   }
+  if (reader.has("title")) nodes.tree.title = reader.at("title").text();
   nodes.tree.root = nodes.read(reader);
   nodes.read_unused();
   // Counted before shared nodes are copied: a few dozen lines can name 2^30 of them. What selections leave out is
@@ -317,14 +317,11 @@ SlabTree tree_from_json(const JsonReader& reader) {
   return nodes.tree;
 }
 
-SlabTree read_tree(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file.good() && !file.eof()) {
-    throw Error(ExitCode::invalid_input, "cannot read the Substrate tree", path, "check the path");
-  }
-  const Json json = parse_json(text, path);
-  return tree_from_json(JsonReader(json, path));
+SlabTree read_tree(const std::filesystem::path& path) {
+  const Json json = parse_json(read_file(path), path.string());
+  SlabTree tree = tree_from_json(JsonReader(json, path.string()));
+  if (tree.title.empty()) tree.title = path.stem().string();
+  return tree;
 }
 
 Json slab_json(const SlabValues& slab) {

@@ -9,6 +9,7 @@
 // in the document's "nodes", or {"unreal": {…}}, one of Unreal's older shading models.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "models/substrate/walk.h"
@@ -19,7 +20,8 @@ namespace lobefit {
 /// Throws Error(invalid_input) with the JSON path of what is wrong: cycles, unknown keys, missing operands, numbers out
 /// of range, more slabs than most_closures.
 SlabTree tree_from_json(const JsonReader& reader);
-SlabTree read_tree(const std::string& path);
+/// From a file; without a title of its own the tree gets the file's name.
+SlabTree read_tree(const std::filesystem::path& path);
 /// What tree_from_json() reads back as the same tree; slabs as their parameters, neutral ones left out.
 Json tree_json(const SlabTree& tree);
 Json slab_json(const SlabValues& slab);
