@@ -6,6 +6,7 @@
 #include "cli/output_folder.h"
 #include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
+#include "cli/table_file.h"
 #include "evaluate/shader.h"
 #include "evaluate/substrate_shader.h"
 #include "fit/substrate_rules.h"
@@ -77,27 +78,12 @@ Table pair_table(const fs::path& path, const Reference& reference, const Grid& g
   for (std::uint32_t i = first; i < first + count; ++i) pairs.values.push_back(i);
   ParameterValues values = reference.defaults();
   values.set("pairs_seed", static_cast<double>(recipe.pairs_seed));
-  OutputFile file(path, context.force || resume);
-  PartFile part(path, {.resume = resume, .overwrite = context.force});
-  RenderJob job;
-  job.part = &part;
   RenderOptions options;
   options.sampling.samples = samples;
   options.sampling.seed = context.seed;
-  Table table;
-  try {
-    table = render(reference, values, {pairs}, grid, options, monitor, job);
-  } catch (const Interrupted&) {
-    throw Error(ExitCode::interrupted, "interrupted", path.string(),
-                fmt::format("{} of {} lines are kept; go on with --resume", part.kept(), part.wanted()));
-  }
-  if (!part.output_is_finished()) {
-    table.command = context.command;
-    table.write(file.temporary());
-    file.commit();
-  }
-  part.remove();
-  return table;
+  return render_into(path, resume, {}, context, [&](const RenderJob& job) {
+    return render(reference, values, {pairs}, grid, options, monitor, job);
+  });
 }
 
 RulePairs rule_pairs(const fs::path& folder, const std::string& name, const RuleRecipe& recipe, std::uint32_t first,

@@ -5,15 +5,14 @@
 
 #include "cli/arguments.h"
 #include "cli/sampling.h"
-#include "reference/output_file.h"
+#include "cli/table_file.h"
 
 namespace lobefit {
 
 namespace {
 
-/// Says what can't be seen in the table at a glance: masked entries, missed targets.
-void warn(const Context& context, const Table& table) {
-  warn_about_failed(context, table);
+/// Says how many entries missed the target.
+void warn_about_targets(const Context& context, const Table& table) {
   if (table.stderr_target <= 0.0) return;
   std::size_t above = 0;
   for (std::size_t entry = 0; entry < table.entries(); ++entry) {
@@ -25,15 +24,6 @@ void warn(const Context& context, const Table& table) {
     context.say(fmt::format("warning: {} of {} entries stopped at {} samples, above the target", above, table.entries(),
                             most_samples));
   }
-}
-
-/// Ctrl-C: what is kept, and how to go on.
-Error interrupted(const PartFile& part, std::size_t lines) {
-  if (part.kept() == 0) {
-    return {ExitCode::interrupted, "interrupted", "", "no line was finished yet, so nothing is kept"};
-  }
-  return {ExitCode::interrupted, fmt::format("interrupted: {} of {} lines are kept", part.kept(), lines),
-          part.path().string(), "the same command with --resume goes on"};
 }
 
 }  // namespace
@@ -83,33 +73,13 @@ void add_render(CLI::App& app, Context& context) {
     const Grid grid = Grid::named_or_file(a->grid, reference ? reference->sphere : is_hair(model->info->kind));
     ParameterValues values = reference ? reference->defaults() : model->defaults();
     set_parameters(values, a->settings);
-    RenderJob job;
-    if (shard->count() > 0) job.shards = Shards::parse(a->shard, "--shard");
-    // A finished output may lie there when resuming; whether it is this render's is looked at before the work.
-    OutputFile file(a->output, context.force || a->resume);
-    PartFile part(a->output, {.resume = a->resume, .overwrite = context.force});
-    job.part = &part;
+    const Shards shards = shard->count() > 0 ? Shards::parse(a->shard, "--shard") : Shards{};
     const auto monitor = context.monitor();
-    Table table;
-    try {
-      table = reference ? render(*reference, values, axes, grid, options, *monitor, job)
-                        : render(*model, values, axes, grid, *monitor, job);
-    } catch (const Interrupted&) {
-      throw interrupted(part, part.wanted());
-    }
-    if (part.resumed() > 0 && !part.output_is_finished()) {
-      context.say(fmt::format("went on from {} of {} lines{}", part.resumed(), part.wanted(),
-                              part.dropped() ? "; what was torn was rendered again" : ""));
-    }
-    if (part.output_is_finished()) {
-      context.say(fmt::format("{} is finished already", a->output));
-    } else {
-      table.command = context.command;
-      table.write(file.temporary());
-      file.commit();
-    }
-    part.remove();
-    warn(context, table);
+    const Table table = render_into(a->output, a->resume, shards, context, [&](const RenderJob& job) {
+      return reference ? render(*reference, values, axes, grid, options, *monitor, job)
+                       : render(*model, values, axes, grid, *monitor, job);
+    });
+    warn_about_targets(context, table);
     float worst = 0.0f;
     for (std::size_t slot = 0; slot < table.stderr_values.size(); ++slot) {
       if (table.valid[slot % table.entries()]) worst = std::max(worst, table.stderr_values[slot]);

@@ -67,24 +67,8 @@ Json closure_json(const Closure& closure, const Direction& wo) {
           {"slab", slab_json(closure.slab)}};
 }
 
-/// The closures as a pixel stores them for a view at 48 degrees.
-std::vector<StoredClosure> stored_closures(const std::vector<Closure>& closures) {
-  std::vector<StoredClosure> result;
-  for (const Closure& closure : closures) {
-    StoredClosure stored;
-    stored.slab = closure.slab;
-    // What a layer takes from light is stored with those below it; a clear one needs no medium of its own.
-    if (largest_channel(closure.slab.diffuse_albedo) <= 0.0) stored.slab.mean_free_path = {0.0, 0.0, 0.0};
-    stored.throughput = closure.view_throughput(FittedBlend::mean_view);
-    stored.transmittance_above = closure.light_above.transmittance;
-    stored.coverage_above = closure.light_above.coverage;
-    result.push_back(stored);
-  }
-  return result;
-}
-
 void print_packed(const std::vector<Closure>& closures) {
-  const std::vector<StoredClosure> stored = stored_closures(closures);
+  const std::vector<StoredClosure> stored = stored_closures(closures, FittedBlend::mean_view);
   const PackedMaterial packed = pack_material(stored);
   fmt::print("\nPacked into {} words{}\n", packed.words.size(),
              packed.storage.medium_words > 0 ? fmt::format(", {} of them of media", packed.storage.medium_words) : "");

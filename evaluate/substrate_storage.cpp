@@ -367,6 +367,21 @@ void set_stored_numbers(StoredClosure& closure, const StorageField& field, std::
   });
 }
 
+std::vector<StoredClosure> stored_closures(const std::vector<Closure>& closures, double cos_theta_o) {
+  std::vector<StoredClosure> result;
+  for (const Closure& closure : closures) {
+    StoredClosure stored;
+    stored.slab = closure.slab;
+    // What a layer takes from light is stored with those below it; a clear one needs no medium of its own.
+    if (largest_channel(closure.slab.diffuse_albedo) <= 0.0) stored.slab.mean_free_path = {0.0, 0.0, 0.0};
+    stored.throughput = closure.view_throughput(cos_theta_o);
+    stored.transmittance_above = closure.light_above.transmittance;
+    stored.coverage_above = closure.light_above.coverage;
+    result.push_back(stored);
+  }
+  return result;
+}
+
 std::vector<ClosureFeatures> storage_features(std::span<const StoredClosure> closures) {
   const auto differs = [](const Rgb& c) { return c.x != 1.0 || c.y != 1.0 || c.z != 1.0; };
   std::vector<ClosureFeatures> features;

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "models/substrate/storage.h"
+#include "models/substrate/walk.h"
 
 namespace lobefit {
 
@@ -41,6 +41,9 @@ struct StoredClosure {
   std::uint32_t specular_profile = 0;  // 0: none
   GlintFootprint glints;
 };
+
+/// A walk's closures as a pixel stores them for a view of this cosine: stored_features() of simplify.h by themselves.
+std::vector<StoredClosure> stored_closures(const std::vector<Closure>& closures, double cos_theta_o);
 
 /// Closures top to bottom; equal normals and tangents get the same tangent basis.
 std::vector<ClosureFeatures> storage_features(std::span<const StoredClosure> closures);

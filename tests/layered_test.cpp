@@ -19,6 +19,7 @@
 #include "reference/specular/rough_interface.h"
 #include "tests/directions.h"
 #include "tests/gauss_legendre.h"
+#include "tests/replicates.h"
 
 namespace lobefit {
 namespace {
@@ -29,36 +30,6 @@ LayerStack stack_of(const std::string& text) {
 }
 
 std::string layers(const std::string& list) { return "{\"layers\":[" + list + "]}"; }
-
-struct RgbEstimate {
-  std::array<MeanAndError, 3> channel;
-
-  double mean() const { return channel[0].mean; }
-  double error() const { return channel[0].standard_error; }
-  /// Distance to the truth in standard errors.
-  double distance(double truth) const { return (mean() - truth) / error(); }
-};
-
-RgbEstimate summarise(const std::array<Rgb, replicate_count>& values) {
-  RgbEstimate result;
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::array<double, replicate_count> column;
-    for (std::size_t r = 0; r < replicate_count; ++r) {
-      column[r] = c == 0 ? values[r].x : c == 1 ? values[r].y : values[r].z;
-    }
-    result.channel[c] = mean_and_error(std::span<const double>(column));
-  }
-  return result;
-}
-
-/// `each(points)` for every replicate.
-RgbEstimate replicates(std::uint64_t seed, const std::function<Rgb(const SamplePoints&)>& each) {
-  std::array<Rgb, replicate_count> values;
-  tbb::parallel_for(std::uint32_t{0}, std::uint32_t{replicate_count}, [&](std::uint32_t r) {
-    values[r] = each(SamplePoints(Sampler::sobol, {seed, 0, r}));
-  });
-  return summarise(values);
-}
 
 Rgb one_sample_row(const Integrator& surface, const Direction& wi, const Direction& wo, const SamplePoints& points,
                    std::uint32_t samples) {

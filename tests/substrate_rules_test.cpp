@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "evaluate/substrate_storage.h"
 #include "models/substrate/conversions.h"
 #include "models/substrate/regime.h"
 #include "reference/render.h"
@@ -323,6 +324,14 @@ TEST(Validation, SameBitsTwice) {
   const ValidationOptions options{.brdf_samples = 64, .albedo_paths = 1024, .spheres = false};
   EXPECT_EQ(validate_tree(tree, shipped(), options, monitor).json({}),
             validate_tree(tree, shipped(), options, monitor).json({}));
+}
+
+TEST(StoredClosures, TakeTheBytesThatAreCounted) {
+  for (const auto& file : fs::directory_iterator(data / "substrate")) {
+    const std::vector<Closure> closures = walk(read_tree(file.path()));
+    const PackedMaterial packed = pack_material(stored_closures(closures, 0.7));
+    EXPECT_EQ(packed.storage.bytes(), tree_bytes(closures)) << file.path();
+  }
 }
 
 TEST(ClosureSelection, IsUnbiasedAndItsVarianceIsWhatItSays) {

@@ -18,6 +18,7 @@
 #include "report/tree_figure.h"
 #include "tests/directions.h"
 #include "tests/gauss_legendre.h"
+#include "tests/replicates.h"
 
 namespace lobefit {
 namespace {
@@ -718,26 +719,6 @@ TEST(TreeText, ShowsTopologyAndStatistics) {
 
 // ---- as matter
 // ---------------------------------------------------------------------------------------------------------
-
-struct RgbEstimate {
-  std::array<MeanAndError, 3> channel;
-};
-
-RgbEstimate replicates(std::uint64_t seed, const std::function<Rgb(const SamplePoints&)>& each) {
-  std::array<Rgb, replicate_count> values;
-  tbb::parallel_for(std::uint32_t{0}, std::uint32_t{replicate_count}, [&](std::uint32_t r) {
-    values[r] = each(SamplePoints(Sampler::sobol, {seed, 0, r}));
-  });
-  RgbEstimate result;
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::array<double, replicate_count> column;
-    for (std::size_t r = 0; r < replicate_count; ++r) {
-      column[r] = c == 0 ? values[r].x : c == 1 ? values[r].y : values[r].z;
-    }
-    result.channel[c] = mean_and_error(std::span<const double>(column));
-  }
-  return result;
-}
 
 // A smooth coat, n = 1.5, over paint of the same index: one interface. Where diffuse albedos are what a slab shows in
 // air, ρ below it is ρ_seen/(1 - F_i + F_i ρ_seen) with the published F_i = .5963; else ρ itself. Adding-doubling takes
