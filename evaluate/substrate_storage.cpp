@@ -369,8 +369,16 @@ void set_stored_numbers(StoredClosure& closure, const StorageField& field, std::
 
 std::vector<StoredClosure> stored_closures(const std::vector<Closure>& closures, double cos_theta_o) {
   std::vector<StoredClosure> result;
+  std::vector<const SpecularProfile*> profiles;
+  const auto profile_number = [&](const SpecularProfile* profile) {
+    if (!profile) return std::uint32_t{0};
+    auto found = std::find(profiles.begin(), profiles.end(), profile);
+    if (found == profiles.end()) found = profiles.insert(profiles.end(), profile);
+    return static_cast<std::uint32_t>(found - profiles.begin()) + 1;
+  };
   for (const Closure& closure : closures) {
     StoredClosure stored;
+    stored.specular_profile = profile_number(closure.profile.get());
     stored.slab = closure.slab;
     // What a layer takes from light is stored with those below it; a clear one needs no medium of its own.
     if (largest_channel(closure.slab.diffuse_albedo) <= 0.0) stored.slab.mean_free_path = {0.0, 0.0, 0.0};

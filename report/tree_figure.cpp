@@ -28,7 +28,8 @@ std::string percent(double share) { return fmt::format("{:.3g} %", 100.0 * share
 bool is_grey(const Rgb& colour) { return colour.x == colour.y && colour.y == colour.z; }
 
 /// What a slab has beyond its colours.
-std::vector<std::string> features(const SlabValues& slab) {
+std::vector<std::string> features(const TreeNode& node) {
+  const SlabValues& slab = node.slab;
   std::vector<std::string> list{fmt::format("roughness {:.3g}", slab.roughness)};
   if (slab.anisotropy != 0.0) list.push_back(fmt::format("anisotropy {:.3g}", slab.anisotropy));
   if (slab.second_roughness_weight > 0.0) {
@@ -46,6 +47,9 @@ std::vector<std::string> features(const SlabValues& slab) {
   }
   if (largest_channel(slab.emissive) > 0.0) list.push_back("emits " + colour_text(slab.emissive));
   if (slab.glint_density > 0.0) list.push_back(fmt::format("glints {:.3g}/uv²", slab.glint_density));
+  if (node.profile) {
+    list.push_back(fmt::format("specular profile, {} views x {} lights", node.profile->views, node.profile->lights));
+  }
   const int model = choice_number(slab.diffuse_model, static_cast<int>(slab_diffuse_choices.size()));
   if (model != 0) list.emplace_back(slab_diffuse_choices[static_cast<std::size_t>(model)]);
   return list;
@@ -116,7 +120,7 @@ void append_text(const Trees& trees, const NodePair& pair, const std::string& in
   const TreeNode& node = node_of(trees, pair);
   if (node.kind == Operator::slab) {
     text += fmt::format("{}: diffuse {}, F0 {}, {}", operator_text(node), colour_text(node.slab.diffuse_albedo),
-                        colour_text(node.slab.f0), fmt::join(features(node.slab), ", "));
+                        colour_text(node.slab.f0), fmt::join(features(node), ", "));
   } else {
     text += operator_text(node);
   }
@@ -242,7 +246,7 @@ class TreePicture {
 
   void draw_slab(const NodePair& pair, double middle, double y) {
     const TreeNode& node = node_of(trees_, pair);
-    const std::vector<std::string> list = features(node.slab);
+    const std::vector<std::string> list = features(node);
     const double left = middle - 0.5 * slab_width, room = slab_width - 2.0 * padding;
     const double height = slab_head + line_height * static_cast<double>(list.size()) + padding;
     bottom_ = std::max(bottom_, y + height);

@@ -523,7 +523,11 @@ TEST(SubstrateStorage, EightClosuresWithEverythingFit) {
 
 TEST(SubstrateStorage, WhatIsLostIsSaid) {
   StoredClosure closure;
-  closure.slab = {.f0 = {0.04, 0.04, 0.04}, .f90 = {1.0, 1.0, 1.0}, .roughness = 1.5, .emissive = {0.0, 2.0, 0.0}};
+  closure.slab = {.f0 = {0.04, 0.04, 0.04},
+                  .f90 = {1.0, 1.0, 1.0},
+                  .roughness = 1.5,
+                  .specular_tint = {1.0, 1.0, 1.0},
+                  .emissive = {0.0, 2.0, 0.0}};
   closure.slab.glint_density = 10.0;
   closure.slab.mean_free_path = {1e-7, 0.0, 1.0};
   closure.glints = {.u = 3.25, .v = 0.5, .major = 0.01, .minor = 0.01};
@@ -705,7 +709,11 @@ TEST(SubstrateStorage, FieldsStandInTheDocument) {
 TEST(SubstrateStorage, ErrorsOfMaterialsStandInTheDocument) {
   const auto slab = [](Rgb albedo, Rgb f0, double roughness) {
     StoredClosure closure;
-    closure.slab = {.diffuse_albedo = albedo, .f0 = f0, .f90 = {1.0, 1.0, 1.0}, .roughness = roughness};
+    closure.slab = {.diffuse_albedo = albedo,
+                    .f0 = f0,
+                    .f90 = {1.0, 1.0, 1.0},
+                    .roughness = roughness,
+                    .specular_tint = {1.0, 1.0, 1.0}};
     return closure;
   };
   const Rgb glass{0.04, 0.04, 0.04}, gold{1.0, 0.71, 0.29};

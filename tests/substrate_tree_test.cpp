@@ -9,12 +9,14 @@
 #include "models/microfacet/fresnel.h"
 #include "models/substrate/blend.h"
 #include "models/substrate/conversions.h"
+#include "models/substrate/simplify.h"
 #include "reference/estimate.h"
 #include "reference/layered/adding_doubling.h"
 #include "reference/output_file.h"
 #include "reference/substrate/physical_surface.h"
 #include "reference/substrate/tree_albedo.h"
 #include "reference/substrate/tree_json.h"
+#include "reference/substrate/unreal_slabs.h"
 #include "report/tree_figure.h"
 #include "tests/directions.h"
 #include "tests/gauss_legendre.h"
@@ -494,8 +496,20 @@ TEST(SubstrateJson, SaysWhatIsWrongAndWhere) {
       {slab(R"("metallic":1)"), "$.slab", "without base_color"},
       {slab(R"("haze_extent":1)"), "$.slab", "without haziness"},
       {slab(R"("base_color":1,"metallic":2)"), "$.slab.metallic", "2 is out of range"},
-      {R"({"unreal":{"model":"hair"}})", "$.unreal.model", "default_lit, clear_coat or cloth"},
-      {R"({"unreal":{"model":"cloth","metallic":1}})", "$.unreal", "unknown key 'metallic'"},
+      {slab(R"("specular_tint":0.5)"), "$.slab", "unknown key 'specular_tint'"},
+      {slab(R"("specular_profile":{})"), "$.slab.specular_profile", "an empty profile"},
+      {slab(R"("specular_profile":{"tabel":[[1]]})"), "$.slab.specular_profile", "tabel"},
+      {slab(R"("specular_profile":{"table":[]})"), "$.slab.specular_profile.table", "an empty table"},
+      {slab(R"("specular_profile":{"table":[[1,1],[1]]})"), "$.slab.specular_profile.table[1]",
+       "1 entries where the rows above have 2"},
+      {slab(R"("specular_profile":{"table":[[1,[1,2,0]]]})"), "$.slab.specular_profile.table[0][1][1]",
+       "2 is out of range"},
+      {slab(R"("specular_profile":{"view_ramp":[]})"), "$.slab.specular_profile.view_ramp", "an empty ramp"},
+      {slab(R"("specular_profile":{"table":[[1]],"light_ramp":[1]})"), "$.slab.specular_profile",
+       "'table' and 'light_ramp' together"},
+      {R"({"unreal":{"model":"hair"}})", "$.unreal.model", "default_lit, clear_coat, cloth, subsurface"},
+      {R"({"unreal":{"model":"cloth","opacity":1}})", "$.unreal", "unknown key 'opacity'"},
+      {R"({"unreal":{"model":"eye","iris_tilt":1}})", "$.unreal.iris_tilt", "1 is out of range"},
       {R"({"unreal":{"roughness":1}})", "$.unreal", "missing 'model'"},
       // Names.
       {R"({"root":"cot","nodes":{"coat":{"slab":{}}}})", "$.root", "did you mean 'coat'"},
@@ -579,6 +593,8 @@ void expect_same(const SlabTree& a, const SlabTree& b, const std::string& name) 
     EXPECT_EQ(p.second, q.second) << name;
     EXPECT_EQ(p.amount, q.amount) << name;
     EXPECT_EQ(p.name, q.name) << name;
+    ASSERT_EQ(p.profile == nullptr, q.profile == nullptr) << name;
+    if (p.profile) expect_near(p.profile->tint(0.3, 0.8), q.profile->tint(0.3, 0.8), 1e-15, name);
     SlabValues s = p.slab, t = q.slab;
     std::vector<double> values;
     const auto collect = [&](auto& member, const ParameterInfo&) {
@@ -600,10 +616,11 @@ TEST(SubstrateJson, TheSchemaKnowsEverySlabKey) {
   const std::string path = (data_folder / "schemas" / "substrate_tree.json").string();
   const Json schema = parse_json(read_file(path), path);
   const Json& properties = schema.at("$defs").at("slab").at("properties");
-  std::set<std::string> written,
-      known{"name", "ior", "base_color", "metallic", "specular", "transmittance", "haziness", "haze_extent"};
+  std::set<std::string> written, known{"name",          "ior",      "base_color",  "metallic",        "specular",
+                                       "transmittance", "haziness", "haze_extent", "specular_profile"};
   for (const auto& [key, ignored] : properties.items()) written.insert(key);
   for (const ParameterInfo& info : describe_parameters<Slab>()) {
+    if (info.name == "specular_tint") continue;  // a profile's value for one pair of directions
     known.insert(std::string(info.name));
     const Json& property = properties.at(std::string(info.name));
     // Colours bound their numbers elsewhere.
@@ -618,6 +635,124 @@ TEST(SubstrateJson, TheSchemaKnowsEverySlabKey) {
     }
   }
   EXPECT_EQ(written, known);
+}
+
+TEST(SubstrateJson, TheSchemaKnowsUnrealsModels) {
+  const std::string path = (data_folder / "schemas" / "substrate_tree.json").string();
+  const Json schema = parse_json(read_file(path), path);
+  std::map<std::string, std::set<std::string>> written, known;
+  for (const Json& model : schema.at("$defs").at("unreal").at("oneOf")) {
+    std::set<std::string>& keys = written[model.at("properties").at("model").at("const").get<std::string>()];
+    for (const auto& [key, ignored] : model.at("properties").items()) keys.insert(key);
+  }
+  const auto add = [&]<class M>(const M&) {
+    std::set<std::string>& keys = known[std::string(unreal_slab_name<M>)];
+    keys.insert("model");
+    for (const ParameterInfo& info : describe_parameters<M>()) keys.insert(std::string(info.name));
+  };
+  std::apply([&](const auto&... models) { (add(models), ...); }, UnrealSlabModels{});
+  EXPECT_EQ(written, known);
+}
+
+// ---- specular profiles and older models
+// --------------------------------------------------------------------------------
+
+// Bilinear tables hold .2 + .3 μ_o + .4 μ_i exactly. What the tint leaves out is the specular part's, which a black
+// body shows alone.
+TEST(SpecularProfile, TintsTheSpecularPartAlone) {
+  const auto tint = [](double o, double i) { return 0.2 + 0.3 * o + 0.4 * i; };
+  Json table = Json::array();
+  for (const double o : {0.0, 0.5, 1.0}) {
+    table.push_back({tint(o, 0.0), tint(o, 1.0 / 3.0), tint(o, 2.0 / 3.0), tint(o, 1.0)});
+  }
+  const std::string rest = R"("f0":0.3,"roughness":0.4,"second_roughness":0.7,"second_roughness_weight":0.3)";
+  const auto with = [&](const std::string& more) {
+    return walk(tree_of(R"({"vertical":{"top":{"slab":{"mean_free_path":3,"diffuse_albedo":0}},"bottom":{"slab":{)" +
+                        rest + more + "}}}}"));
+  };
+  const std::vector<Closure> tinted = with(R"(,"specular_profile":{"table":)" + table.dump() + "}"), plain = with(""),
+                             specular = with(R"(,"diffuse_albedo":0)");
+  ASSERT_EQ(tinted.size(), 2u);
+  for (const DirectionPair& pair : random_pairs(100, 12)) {
+    const Rgb f = tinted[1].evaluate(pair.wi, pair.wo), lost = specular[1].evaluate(pair.wi, pair.wo);
+    expect_near(f, plain[1].evaluate(pair.wi, pair.wo) - lost * (1.0 - tint(pair.wo.z, pair.wi.z)), 1e-12);
+  }
+}
+
+TEST(SpecularProfile, RampsMultiply) {
+  const std::vector<Closure> closures =
+      walk(tree_of(R"({"slab":{"specular_profile":{"view_ramp":[0.2,[1,0.5,0]],"light_ramp":[0.4,0.6,1]}}})"));
+  ASSERT_TRUE(closures[0].profile);
+  expect_near(closures[0].profile->tint(0.25, 0.75), Rgb{0.4, 0.275, 0.15} * 0.8, 1e-14);
+  expect_near(closures[0].profile->tint(1.0, 0.0), Rgb{0.4, 0.2, 0.0}, 1e-14);
+}
+
+TEST(SpecularProfile, IsMixedByTheLightOfBothLobes) {
+  const auto mixed_tint = [](double f0_other) {
+    const SlabTree tree =
+        tree_of(R"({"horizontal":{"mix":0.25,"background":{"slab":{"f0":)" + std::to_string(f0_other) +
+                R"(}},"foreground":{"slab":{"f0":0.3,"specular_profile":{"view_ramp":[0.2]}}}}})");
+    const SlabTree one =
+        collapsed(collapsible(tree), collapsible_operators(collapsible(tree)).at(0), BlendRule::fitted, {});
+    const std::vector<Closure> closures = walk(one);
+    EXPECT_EQ(closures.size(), 1u);
+    return closures.at(0).profile->tint(0.3, 0.6).y;
+  };
+  EXPECT_NEAR(mixed_tint(0.3), 0.75 + 0.25 * 0.2, 1e-12);
+  EXPECT_NEAR(mixed_tint(0.1), 0.5 + 0.5 * 0.2, 1e-12);
+  EXPECT_NEAR(mixed_tint(0.0), 0.2, 1e-12);
+}
+
+TEST(SpecularProfile, CostsItsNumberUntilItIsDropped) {
+  SlabTree tree = tree_of(R"({"slab":{"specular_profile":{"view_ramp":[0.5,[1,0.5,1]]}}})");
+  const std::vector<Closure> with = walk(tree);
+  EXPECT_TRUE(stored_features(with)[0].specular_profile);
+  EXPECT_TRUE(drop_feature(tree, SlabFeature::specular_profile));
+  EXPECT_FALSE(drop_feature(tree, SlabFeature::specular_profile));
+  const std::vector<Closure> without = walk(tree);
+  EXPECT_FALSE(stored_features(without)[0].specular_profile);
+  EXPECT_LT(tree_bytes(without), tree_bytes(with));
+  // Face on and in the mirror's direction the light is the same.
+  const Direction up{0.0, 0.0, 1.0};
+  SlabValues black_with = with[0].slab, black_without = without[0].slab;
+  black_with.diffuse_albedo = black_without.diffuse_albedo = {0.0, 0.0, 0.0};
+  Closure a = with[0], b = without[0];
+  a.slab = black_with;
+  b.slab = black_without;
+  expect_near(a.evaluate(up, up), b.evaluate(up, up), 0.03 * a.evaluate(up, up).x);
+}
+
+// At opacity 0 the term is c ((1 - 3 s¹²)/2π + 3 s¹²), s = sat(-V·L); over the sphere that is 2 - 3/13 + 6π/13.
+TEST(UnrealSlabs, ScatteredSharesAddUpToTheTermsIntegral) {
+  auto pins = default_parameters<UnrealSubsurface>();
+  pins.opacity = 0.0;
+  pins.subsurface_color = {0.5, 0.25, 1.0};
+  const ScatteredShares shares = scattered_shares<UnrealSubsurface>(pins);
+  const double integral = 2.0 - 3.0 / 13.0 + 6.0 * pi / 13.0;
+  expect_near(shares.back + shares.through, pins.subsurface_color * integral, 3e-3 * integral);
+  EXPECT_GT(shares.through.x, shares.back.x);
+}
+
+TEST(UnrealSlabs, LeavesLetThroughWhatTheirTermSends) {
+  const SlabTree leaf = tree_of(
+      R"({"thin":true,"unreal":{"model":"two_sided_foliage","base_color":[0.1,0.2,0.05],"subsurface_color":0.8}})");
+  auto pins = default_parameters<UnrealTwoSidedFoliage>();
+  pins.subsurface_color = {0.8, 0.8, 0.8};
+  const ScatteredShares shares = scattered_shares<UnrealTwoSidedFoliage>(pins);
+  EXPECT_GT(shares.through.x, 0.05);
+  expect_near(root_statistics(leaf).transmittance, shares.through, 1e-12);
+  const SlabValues slab = leaf.node(leaf.root).slab;
+  EXPECT_NEAR(slab.diffuse_albedo.y - slab.diffuse_albedo.x, 0.1, 1e-12);
+}
+
+TEST(UnrealSlabs, SkinHasTheProfilesTwoLobes) {
+  const SlabTree skin = tree_of(R"({"unreal":{"model":"subsurface_profile","roughness":0.4,"base_color":0.7}})");
+  const SlabValues slab = skin.node(skin.root).slab;
+  EXPECT_NEAR(slab.roughness, 0.3, 1e-15);
+  EXPECT_NEAR(slab.second_roughness, 0.52, 1e-15);
+  EXPECT_NEAR(slab.second_roughness_weight, 0.85, 1e-15);
+  EXPECT_EQ(slab.diffuse_albedo.x, 0.7);
+  EXPECT_NEAR(slab.f0.x, 0.04, 1e-15);
 }
 
 // ---- the shipped trees

@@ -83,6 +83,7 @@ LOBEFIT_TEXT Slab::Parameters<T> lerp_slabs(const Slab::Parameters<T>& a, const 
   result.fuzz_amount = fuzz;
   result.phase_anisotropy = lerp(a.phase_anisotropy, b.phase_anisotropy, t);
   result.thickness = lerp(a.thickness, b.thickness, t);
+  result.specular_tint = lerp(a.specular_tint, b.specular_tint, t);
   result.emissive = lerp(a.emissive, b.emissive, t);
   // Of transmittances the mean; a mean free path has none.
   Vec3<T> depth = each_channel(slab_depth(a), slab_depth(b), [&](const T& da, const T& db) {
@@ -350,6 +351,7 @@ struct FittedBlend {
     const T light_b = let("light_b", mix * mean_of_channels(specular_b));
     const T share = let("share_b", light_b / max(light_a + light_b, 1e-9));
     result.f90 = lerp(background.f90, foreground.f90, share);
+    result.specular_tint = lerp(background.specular_tint, foreground.specular_tint, share);
     result.anisotropy = lerp(background.anisotropy, foreground.anisotropy, share);
     merge_lobes<merge>(result, slab_alpha(background), light_a, slab_alpha(foreground), light_b, c.mix_power);
     set_light(result, lerp(specular_a, specular_b, mix), body, cos_theta_o);

@@ -1,9 +1,8 @@
-// From other ways to describe a material to a slab's parameters: Substrate's helper nodes, and Unreal's older shading
-// models as trees.
+// From other ways to describe a material to a slab's parameters: Substrate's helper nodes.
 #pragma once
 
 #include "models/specular/haze.h"
-#include "models/substrate/walk.h"
+#include "models/substrate/tree.h"
 
 namespace lobefit {
 
@@ -55,39 +54,6 @@ inline void set_haziness(SlabValues& slab, double haziness, double extent) {
   slab.f0 = slab.f0 * haze.gain;
   slab.second_roughness = std::sqrt(haze.wide_alpha);
   slab.second_roughness_weight = haze.weight;
-}
-
-// ---- Unreal's older shading models ---------------------------------------------------------------------------------
-
-/// DefaultLit: one slab.
-inline int add_default_lit(SlabTree& tree, const Rgb& base_color, double metallic, double specular, double roughness,
-                           double anisotropy = 0.0) {
-  SlabValues slab = default_slab();
-  set_metalness(slab, base_color, metallic, specular);
-  slab.roughness = roughness;
-  slab.anisotropy = min(max(anisotropy, -0.9), 0.9);
-  return tree.add_slab(slab, "default_lit");
-}
-
-/// ClearCoat: a colourless film of F0 .04 that covers `clear_coat` of a DefaultLit slab.
-inline int add_clear_coat(SlabTree& tree, int base, double clear_coat, double clear_coat_roughness) {
-  SlabValues film = default_slab();
-  film.diffuse_albedo = {0.0, 0.0, 0.0};
-  film.roughness = clear_coat_roughness;
-  film.mean_free_path = {longest_mean_free_path, longest_mean_free_path, longest_mean_free_path};
-  const int coat = tree.add_slab(film, "clear_coat");
-  return tree.add_vertical(clear_coat < 1.0 ? tree.add_coverage(coat, clear_coat) : coat, base, 0.01);
-}
-
-/// Cloth: DefaultLit under fuzz.
-inline int add_cloth(SlabTree& tree, const Rgb& base_color, double specular, double roughness, double cloth,
-                     const Rgb& fuzz_color) {
-  const int index = add_default_lit(tree, base_color, 0.0, specular, roughness);
-  SlabValues& slab = tree.node(index).slab;
-  slab.fuzz_amount = cloth;
-  slab.fuzz_color = fuzz_color;
-  slab.fuzz_roughness = max(roughness, 0.01);
-  return index;
 }
 
 }  // namespace lobefit

@@ -53,6 +53,21 @@ struct PartialSlab {
   double coverage = 1.0;
 };
 
+/// Of the specular light that two operands send back at normal incidence, the share of the second.
+inline double specular_share(Operator kind, const PartialSlab& first, const PartialSlab& second, double mix) {
+  double a = first.coverage, b = second.coverage;
+  if (kind == Operator::horizontal) {
+    a *= 1.0 - mix;
+    b *= mix;
+  } else {
+    const double passed = 1.0 - mean_channel(first.slab.f0), through = mean_channel(medium_transmittance(first.slab));
+    b *= 1.0 - first.coverage + first.coverage * square(passed * through);
+  }
+  a *= mean_channel(first.slab.f0);
+  b *= mean_channel(second.slab.f0);
+  return a + b > 0.0 ? b / (a + b) : 0.0;
+}
+
 /// A mix in the proportion of what is there.
 inline PartialSlab blend_horizontal(const PartialSlab& background, const PartialSlab& foreground, double mix,
                                     BlendRule rule, const BlendSetting& at) {
@@ -144,6 +159,7 @@ inline SlabTree collapsed(SlabTree tree, int index, BlendRule rule, const BlendS
     const SlabUnderCoverage found = SlabUnderCoverage::of(tree, number);
     return PartialSlab{tree.node(found.slab).slab, found.coverage};
   };
+  const auto profile = [&](int number) { return tree.node(SlabUnderCoverage::of(tree, number).slab).profile; };
   const PartialSlab merged = node.kind == Operator::horizontal
                                  ? blend_horizontal(operand(node.first), operand(node.second), node.amount, rule, at)
                                  : blend_vertical(operand(node.first), operand(node.second), rule, at);
@@ -153,6 +169,8 @@ inline SlabTree collapsed(SlabTree tree, int index, BlendRule rule, const BlendS
   };
   TreeNode slab{.kind = Operator::slab,
                 .slab = merged.slab,
+                .profile = mixed(profile(node.first), profile(node.second),
+                                 specular_share(node.kind, operand(node.first), operand(node.second), node.amount)),
                 .name = name(node.first) + (node.kind == Operator::horizontal ? "|" : "/") + name(node.second),
                 .path = node.path};
   if (merged.coverage >= 1.0 - 1e-12) {
@@ -167,14 +185,22 @@ inline SlabTree collapsed(SlabTree tree, int index, BlendRule rule, const BlendS
 // ---- features ------------------------------------------------------------------------------------------------------
 
 /// What collapsing gives up last, in this order: by bytes saved, and by how little most materials show it.
-enum class SlabFeature { glints, f90, anisotropy, second_lobe, fuzz };
-inline constexpr std::array<std::string_view, 5> slab_feature_names{"glints", "f90", "anisotropy", "second_lobe",
-                                                                    "fuzz"};
+enum class SlabFeature { glints, specular_profile, f90, anisotropy, second_lobe, fuzz };
+inline constexpr std::array<std::string_view, 6> slab_feature_names{"glints",     "specular_profile", "f90",
+                                                                    "anisotropy", "second_lobe",      "fuzz"};
 
-inline bool has_feature(const SlabValues& slab, SlabFeature feature) {
-  const ClosureFeatures features = features_of(slab);
+/// What a slab's node makes use of.
+inline ClosureFeatures features_of(const SlabValues& slab, const SpecularProfilePointer& profile) {
+  ClosureFeatures features = features_of(slab);
+  features.specular_profile = profile != nullptr;
+  return features;
+}
+
+inline bool has_feature(const TreeNode& node, SlabFeature feature) {
+  const ClosureFeatures features = features_of(node.slab, node.profile);
   switch (feature) {
     case SlabFeature::glints: return features.glints;
+    case SlabFeature::specular_profile: return features.specular_profile;
     case SlabFeature::f90: return features.f90;
     case SlabFeature::anisotropy: return features.anisotropy;
     case SlabFeature::second_lobe: return features.second_lobe;
@@ -182,11 +208,17 @@ inline bool has_feature(const SlabValues& slab, SlabFeature feature) {
   }
 }
 
-/// Without a feature: glints become their far field, the lobe; two lobes one of their mean variance; fibres what they
-/// send back on the average, as diffuse albedo.
-inline SlabValues without_feature(SlabValues slab, SlabFeature feature) {
+/// Turns a slab's feature off: glints become their far field, the lobe; a profile the tints of its diagonal's ends, in
+/// f0 and f90; two lobes one of their mean variance; fibres what they send back on the average, as diffuse albedo.
+inline void remove_feature(TreeNode& node, SlabFeature feature) {
+  SlabValues& slab = node.slab;
   switch (feature) {
     case SlabFeature::glints: slab.glint_density = 0.0; break;
+    case SlabFeature::specular_profile:
+      slab.f0 = slab.f0 * node.profile->tint(1.0, 1.0);
+      slab.f90 = slab.f90 * node.profile->tint(0.0, 0.0);
+      node.profile = nullptr;
+      break;
     case SlabFeature::f90: slab.f90 = {1.0, 1.0, 1.0}; break;
     case SlabFeature::anisotropy: slab.anisotropy = 0.0; break;
     case SlabFeature::second_lobe:
@@ -206,7 +238,6 @@ inline SlabValues without_feature(SlabValues slab, SlabFeature feature) {
       slab.fuzz_amount = 0.0;
     }
   }
-  return slab;
 }
 
 /// Turns a feature off in every slab that is reached; false where none had it.
@@ -217,8 +248,8 @@ inline bool drop_feature(SlabTree& tree, SlabFeature feature) {
     if (node.kind != Operator::slab) {
       visit(node.first);
       if (node.second >= 0) visit(node.second);
-    } else if (has_feature(node.slab, feature)) {
-      node.slab = without_feature(node.slab, feature);
+    } else if (has_feature(node, feature)) {
+      remove_feature(node, feature);
       any = true;
     }
   };
@@ -233,7 +264,7 @@ inline bool drop_feature(SlabTree& tree, SlabFeature feature) {
 inline std::vector<ClosureFeatures> stored_features(const std::vector<Closure>& closures) {
   std::vector<ClosureFeatures> result;
   for (const Closure& closure : closures) {
-    ClosureFeatures features = features_of(closure.slab);
+    ClosureFeatures features = features_of(closure.slab, closure.profile);
     features.medium = features.medium && features.diffuse;
     features.below = !closure.above.empty();
     features.throughput = features.below || closure.weight < 1.0;

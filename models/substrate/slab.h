@@ -85,7 +85,7 @@ struct Slab {
     T fuzz_roughness;
     Vec3<T> mean_free_path;
     T phase_anisotropy, thickness;
-    Vec3<T> emissive;
+    Vec3<T> specular_tint, emissive;
     T glint_density, diffuse_model;
   };
 
@@ -151,6 +151,12 @@ struct Slab {
                                      .initial = 0.1,
                                      .tier = Tier::full,
                                      .doc = "Of the medium; a tree's vertical operators set it."});
+    visit(p.specular_tint, ParameterInfo{.name = "specular_tint",
+                                         .symbol = "c_s",
+                                         .initial = 1.0,
+                                         .tier = Tier::full,
+                                         .doc = "Of the specular reflection: what a specular profile holds for this "
+                                                "view and light. What it takes away is absorbed."});
     visit(p.emissive, ParameterInfo{.name = "emissive",
                                     .symbol = "L_e",
                                     .unit = "W/(m2 sr)",
@@ -223,7 +229,8 @@ struct Slab {
   static std::array<Rgb, 3> lobe_albedos(const Parameters<double>& p, double cos_theta) {
     const double fuzz = p.fuzz_amount * ZeltnerFit::Albedo::evaluate(cos_theta, p.fuzz_roughness);
     const Rgb specular = specular_albedo(p, cos_theta);
-    return {p.fuzz_color * fuzz, specular * (1.0 - fuzz), p.diffuse_albedo * (1.0 - specular) * (1.0 - fuzz)};
+    return {p.fuzz_color * fuzz, p.specular_tint * specular * (1.0 - fuzz),
+            p.diffuse_albedo * (1.0 - specular) * (1.0 - fuzz)};
   }
 
   static Direction sample(const Parameters<double>& p, const Direction& wo, std::array<double, 2> u) {
@@ -280,8 +287,8 @@ struct Slab {
         let("second", ggx_lobe(KullaContyAnisotropy::evaluate(T(square(p.second_roughness)), p.anisotropy), g));
     const LobeAlbedo<T> albedo = lobes_albedo(p, g.cos_theta_o);
     Vec3<T> fresnel = let("fresnel", call<SchlickFresnel>(g.cos_theta_d, p.f0, f90));
-    Vec3<T> specular = let(
-        "specular", fresnel * lerp(lobe, second, p.second_roughness_weight) * turquin_scale(p.f0, T(1.0 - albedo.all)));
+    Vec3<T> specular = let("specular", p.specular_tint * fresnel * lerp(lobe, second, p.second_roughness_weight) *
+                                           turquin_scale(p.f0, T(1.0 - albedo.all)));
     Vec3<T> specular_albedo = let("specular_albedo", albedo.specular(p.f0, f90));
 
     const T fuzz_albedo = let("fuzz_albedo", p.fuzz_amount * call<ZeltnerFit::Albedo>(g.cos_theta_o, p.fuzz_roughness));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "models/substrate/specular_profile.h"
 #include "models/substrate/storage.h"
 
 namespace lobefit {
@@ -17,7 +18,8 @@ inline constexpr std::array<std::string_view, 5> operator_names{"slab", "vertica
 /// A node and, by index, its operands. An operand may serve several nodes.
 struct TreeNode {
   Operator kind = Operator::slab;
-  SlabValues slab{};  // of a slab
+  SlabValues slab{};               // of a slab
+  SpecularProfilePointer profile;  // of a slab
   /// Top and bottom; background and foreground; operand alone; a and b.
   int first = -1, second = -1;
   /// Thickness of the top, cm (negative: the slab's own); mix, the share of the foreground; weight; mask: b from ½ on.
@@ -56,18 +58,20 @@ struct SlabTree {
   }
 };
 
-/// A slab of the neutral parameters of Slab::describe().
-inline SlabValues default_slab() {
-  SlabValues slab{};
-  Slab::describe(slab, [](auto& member, const ParameterInfo& info) {
+/// The neutral parameters of M::describe().
+template <class M>
+typename M::template Parameters<double> default_parameters() {
+  typename M::template Parameters<double> values{};
+  M::describe(values, [](auto& member, const ParameterInfo& info) {
     if constexpr (is_vector<std::remove_cvref_t<decltype(member)>>) {
       member = {info.initial, info.initial, info.initial};
     } else {
       member = info.initial;
     }
   });
-  return slab;
+  return values;
 }
+inline SlabValues default_slab() { return default_parameters<Slab>(); }
 
 inline double largest_channel(const Rgb& c) { return max(max(c.x, c.y), c.z); }
 inline double mean_channel(const Rgb& c) { return (c.x + c.y + c.z) / 3.0; }

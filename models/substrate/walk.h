@@ -119,6 +119,7 @@ inline VirtualSlab statistics(const SlabTree& tree, int index) {
 /// What the renderer evaluates: a slab and what becomes of light on the way to it.
 struct Closure {
   SlabValues slab;
+  SpecularProfilePointer profile;
   double weight = 1.0;                       // coverage and mixing, of the slab itself
   std::vector<VirtualSlab> above;            // that the view looks through, one for each vertical operator
   VirtualSlab light_above{.coverage = 0.0};  // the same as one, which every light passes
@@ -134,7 +135,9 @@ struct Closure {
   /// BRDF, 1/sr without cosine: 0 unless both directions are above the surface.
   Rgb evaluate(const Direction& wi, const Direction& wo) const {
     if (!(wi.z > 0.0 && wo.z > 0.0)) return {0.0, 0.0, 0.0};
-    return evaluate_brdf<Slab, double>(slab, wi, wo) * view_throughput(wo.z) * light_above.passes_medium(wi.z);
+    SlabValues tinted = slab;
+    if (profile) tinted.specular_tint = profile->tint(wo.z, wi.z);
+    return evaluate_brdf<Slab, double>(tinted, wi, wo) * view_throughput(wo.z) * light_above.passes_medium(wi.z);
   }
 };
 
@@ -170,6 +173,7 @@ inline void collect(const SlabTree& tree, int index, Closure closure, const Walk
   switch (node.kind) {
     case Operator::slab: {
       closure.slab = node.slab;
+      closure.profile = node.profile;
       closure.leaf = index;
       closure.path = node.path;
       closure.name = node.name;
@@ -260,6 +264,7 @@ inline std::vector<Closure> walk(const SlabTree& given, const WalkOptions& optio
     for (const int leaf : event.leaves) {
       const TreeNode& node = tree.node(leaf);
       Closure closure{.slab = node.slab,
+                      .profile = node.profile,
                       .weight = event.probability,
                       .above = layers,
                       .light_above = above,

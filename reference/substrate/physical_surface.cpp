@@ -167,6 +167,7 @@ std::vector<std::string> physical_notes(const SlabTree& given) {
     const SlabValues& slab = node.slab;
     if (slab.anisotropy != 0.0) note(node, "the integrator's facets are isotropic, with the mean alpha");
     if (slab.f90.x != slab.f90.y || slab.f90.y != slab.f90.z) note(node, "no interface has a coloured F90: left out");
+    if (node.profile) note(node, "no interface has a specular profile: left out");
     if (slab.fuzz_amount > 0.0 && !topmost[i]) note(node, "fuzz under a layer is left out");
     const bool coloured = slab.f0.x != slab.f0.y || slab.f0.y != slab.f0.z;
     if (coloured && !is_opaque(slab)) note(node, "a layer's interface has one index: f0 lost its colour");

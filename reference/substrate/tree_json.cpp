@@ -6,6 +6,7 @@
 
 #include "models/substrate/conversions.h"
 #include "reference/output_file.h"
+#include "reference/substrate/unreal_slabs.h"
 
 namespace lobefit {
 
@@ -33,9 +34,12 @@ Rgb rgb_between(const JsonReader& reader, double lower, double upper) {
 
 /// A slab's names: its parameters, and those of the helper nodes.
 std::vector<std::string> slab_keys() {
-  std::vector<std::string> keys{"name",     "ior",           "base_color", "metallic",
-                                "specular", "transmittance", "haziness",   "haze_extent"};
-  for (const ParameterInfo& info : describe_parameters<Slab>()) keys.emplace_back(info.name);
+  std::vector<std::string> keys{"name",          "ior",      "base_color",  "metallic",        "specular",
+                                "transmittance", "haziness", "haze_extent", "specular_profile"};
+  for (const ParameterInfo& info : describe_parameters<Slab>()) {
+    // A profile's value for one pair of directions.
+    if (info.name != "specular_tint") keys.emplace_back(info.name);
+  }
   return keys;
 }
 
@@ -48,9 +52,10 @@ void refuse_together(const JsonReader& reader, const char* helper, std::initiali
   }
 }
 
-SlabValues read_slab_values(const JsonReader& reader) {
-  SlabValues slab = default_slab();
-  Slab::describe(slab, [&](auto& member, const ParameterInfo& info) {
+/// Sets what is given of a model's parameters.
+template <class M>
+void read_values(const JsonReader& reader, typename M::template Parameters<double>& values) {
+  M::describe(values, [&](auto& member, const ParameterInfo& info) {
     if (!reader.has(info.name)) return;
     const JsonReader value = reader.at(info.name);
     const double upper = info.name == "mean_free_path" ? longest_mean_free_path : info.upper;
@@ -67,7 +72,40 @@ SlabValues read_slab_values(const JsonReader& reader) {
       member = number_between(value, info.lower, upper);
     }
   });
-  return slab;
+}
+
+/// Colours from grazing to normal.
+std::vector<Rgb> read_ramp(const JsonReader& reader) {
+  std::vector<Rgb> ramp;
+  for (const JsonReader& element : reader.elements()) ramp.push_back(rgb_between(element, 0.0, 1.0));
+  if (ramp.empty()) throw reader.error("an empty ramp", "write colours from grazing to normal");
+  return ramp;
+}
+
+SpecularProfilePointer read_profile(const JsonReader& reader) {
+  reader.allow({"table", "view_ramp", "light_ramp"});
+  if (!reader.has("table")) {
+    if (!reader.has("view_ramp") && !reader.has("light_ramp")) {
+      throw reader.error("an empty profile", "write a table, or a view_ramp, a light_ramp or both");
+    }
+    const auto ramp = [&](const char* key) {
+      return reader.has(key) ? read_ramp(reader.at(key)) : std::vector<Rgb>{{1.0, 1.0, 1.0}};
+    };
+    return std::make_shared<const SpecularProfile>(SpecularProfile::of_ramps(ramp("view_ramp"), ramp("light_ramp")));
+  }
+  refuse_together(reader, "table", {"view_ramp", "light_ramp"});
+  SpecularProfile profile{0, 0, {}};
+  for (const JsonReader& row : reader.at("table").elements()) {
+    const std::vector<Rgb> tints = read_ramp(row);
+    if (profile.views++ > 0 && tints.size() != profile.lights) {
+      throw row.error(fmt::format("{} entries where the rows above have {}", tints.size(), profile.lights),
+                      "give every view as many lights");
+    }
+    profile.lights = tints.size();
+    profile.tints.insert(profile.tints.end(), tints.begin(), tints.end());
+  }
+  if (profile.views == 0) throw reader.at("table").error("an empty table", "write a row of colours for each view");
+  return std::make_shared<const SpecularProfile>(std::move(profile));
 }
 
 TreeNode read_slab(const JsonReader& reader) {
@@ -82,8 +120,10 @@ TreeNode read_slab(const JsonReader& reader) {
   refuse_together(reader, "transmittance", {"mean_free_path"});
   refuse_together(reader, "haziness", {"second_roughness", "second_roughness_weight"});
 
-  TreeNode node{.slab = read_slab_values(reader), .path = reader.path()};
+  TreeNode node{.slab = default_slab(), .path = reader.path()};
   SlabValues& slab = node.slab;
+  read_values<Slab>(reader, slab);
+  if (reader.has("specular_profile")) node.profile = read_profile(reader.at("specular_profile"));
   if (reader.has("name")) node.name = reader.at("name").text();
   if (reader.has("ior")) {
     const double f0 = f0_of_index(number_between(reader.at("ior"), 1.0, 100.0));
@@ -209,35 +249,26 @@ class TreeReader {
 
   int read_unreal(const JsonReader& reader) {
     const std::string model = reader.at("model").text();
-    const auto share = [&](const char* key, double initial) {
-      return reader.has(key) ? number_between(reader.at(key), 0.0, 1.0) : initial;
-    };
-    const auto color = [&](const char* key, double initial) {
-      return reader.has(key) ? rgb_between(reader.at(key), 0.0, 1.0) : Rgb{initial, initial, initial};
-    };
     const std::size_t before = tree.nodes.size();
     int index = -1;
-    if (model == "default_lit" || model == "clear_coat") {
-      if (model == "default_lit") {
-        reader.allow({"model", "base_color", "metallic", "specular", "roughness", "anisotropy"});
-      } else {
-        reader.allow(
-            {"model", "base_color", "metallic", "specular", "roughness", "clear_coat", "clear_coat_roughness"});
+    std::string known;
+    const auto read_as = [&]<class M>(const M&) {
+      const std::string name(unreal_slab_name<M>);
+      known += (known.empty() ? "" : ", ") + name;
+      if (name != model) return;
+      std::vector<std::string> keys{"model"};
+      for (const ParameterInfo& info : describe_parameters<M>()) keys.emplace_back(info.name);
+      for (const auto& [key, member] : reader.members()) {
+        if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+          throw reader.error("unknown key '" + key + "'", "did you mean '" + nearest_name(key, keys) + "'?");
+        }
       }
-      const double anisotropy = reader.has("anisotropy") ? number_between(reader.at("anisotropy"), -1.0, 1.0) : 0.0;
-      index = add_default_lit(tree, color("base_color", 0.5), share("metallic", 0.0), share("specular", 0.5),
-                              share("roughness", 0.5), anisotropy);
-      if (model == "clear_coat") {
-        index = add_clear_coat(tree, index, share("clear_coat", 1.0), share("clear_coat_roughness", 0.1));
-      }
-    } else if (model == "cloth") {
-      reader.allow({"model", "base_color", "specular", "roughness", "cloth", "fuzz_color"});
-      index = add_cloth(tree, color("base_color", 0.5), share("specular", 0.5), share("roughness", 0.5),
-                        share("cloth", 1.0), color("fuzz_color", 0.5));
-    } else {
-      throw reader.at("model").error("no slabs are known for '" + model + "'",
-                                     "choose default_lit, clear_coat or cloth");
-    }
+      auto pins = default_parameters<M>();
+      read_values<M>(reader, pins);
+      index = add_unreal_slabs(tree, pins);
+    };
+    std::apply([&](const auto&... models) { (read_as(models), ...); }, UnrealSlabModels{});
+    if (index < 0) throw reader.at("model").error("no slabs are known for '" + model + "'", "choose one of " + known);
     for (std::size_t i = before; i < tree.nodes.size(); ++i) tree.nodes[i].path = reader.path();
     return index;
   }
@@ -346,6 +377,19 @@ Json slab_json(const SlabValues& slab) {
 
 namespace {
 
+Json profile_json(const SpecularProfile& profile) {
+  Json table = Json::array();
+  for (std::size_t view = 0; view < profile.views; ++view) {
+    Json row = Json::array();
+    for (std::size_t light = 0; light < profile.lights; ++light) {
+      const Rgb& tint = profile.entry(view, light);
+      row.push_back({tint.x, tint.y, tint.z});
+    }
+    table.push_back(std::move(row));
+  }
+  return {{"table", std::move(table)}};
+}
+
 Json node_json(const SlabTree& tree, int index) {
   const TreeNode& node = tree.node(index);
   const auto operand = [&](int number) { return node_json(tree, number); };
@@ -354,6 +398,7 @@ Json node_json(const SlabTree& tree, int index) {
       Json slab = Json::object();
       if (!node.name.empty()) slab["name"] = node.name;
       slab.update(slab_json(node.slab));
+      if (node.profile) slab["specular_profile"] = profile_json(*node.profile);
       return {{"slab", slab}};
     }
     case Operator::vertical: {
