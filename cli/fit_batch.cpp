@@ -9,21 +9,12 @@
 
 #include "reference/json_reader.h"
 #include "reference/output_file.h"
+#include "reference/quiet_monitor.h"
 #include "report/material_figure.h"
 
 namespace lobefit {
 
 namespace {
-
-/// What a fit within a batch tells: whether to stop.
-class Quiet : public Monitor {
- public:
-  explicit Quiet(Monitor& batch) : batch_(batch) {}
-  void check() override { batch_.check(); }
-
- private:
-  Monitor& batch_;
-};
 
 struct Outcome {
   std::string name, failure;
@@ -235,7 +226,7 @@ void run_fit_batch(const FitSettings& settings, const std::vector<FitSource>& so
     if (resume) outcome.document = earlier(path, source, context);
     outcome.kept = !outcome.document.is_null();
     if (!outcome.kept) {
-      Quiet quiet(*monitor);
+      QuietMonitor quiet(*monitor);
       quiet.check();
       try {
         FitJob job = run_fit(settings, source, context, quiet);

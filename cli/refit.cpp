@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "cli/output_folder.h"
+#include "cli/refit_approximations.h"
 #include "cli/refit_curves.h"
 #include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
@@ -233,6 +234,7 @@ void run(const std::string& name, const std::string& output, bool resume, const 
     case RecipeKind::constants: return refit_constants(path, output, context);
     case RecipeKind::curves: return refit_curves(path, output, context);
     case RecipeKind::substrate_rules: return refit_substrate_rules(path, output, resume, context);
+    case RecipeKind::approximations: return refit_approximations(path, output, context);
   }
 }
 

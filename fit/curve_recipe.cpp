@@ -12,6 +12,7 @@
 #include "fit/dual_model.h"
 #include "fit/recipe_reading.h"
 #include "reference/output_file.h"
+#include "reference/quiet_monitor.h"
 
 namespace lobefit {
 
@@ -140,16 +141,6 @@ CurveComparison read_comparison(const JsonReader& reader, const CurveRecipe& rec
 }
 
 // ---- Rows -----------------------------------------------------------------------------------------------------
-
-/// Only hears whether to stop: what runs beside others has no progress of its own to tell.
-class Listener : public Monitor {
- public:
-  explicit Listener(Monitor& monitor) : monitor_(monitor) {}
-  void check() override { monitor_.check(); }
-
- private:
-  Monitor& monitor_;
-};
 
 /// Sets a parameter even outside its range.
 void force(ParameterValues& values, std::string_view name, double value) {
@@ -810,7 +801,7 @@ CurveResult run_recipe(const CurveRecipe& recipe, std::uint64_t seed, Monitor& m
     result.tables.push_back({reference.name, std::move(table)});
   }
 
-  Listener listener(monitor);
+  QuietMonitor listener(monitor);
   std::vector<std::vector<CurveRow>> rows(result.series.size());
   const auto fit_series = [&](std::size_t s, const std::vector<CurveRow>* held) {
     const std::vector<Slice>& own = slices[slices_of_series[s]];

@@ -48,7 +48,7 @@ Rival read_rival(const JsonReader& reader, const std::vector<Axis>& axes) {
 }
 
 RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_values, const std::vector<Axis>& axes) {
-  reader.allow({"name", "views", "model", "reference", "grid", "metric", "weights", "free"});
+  reader.allow({"name", "views", "model", "fixed", "reference", "grid", "metric", "weights", "free"});
   RecipeRow row;
   row.model = reader.has("model") ? reader.at("model").text() : recipe_values.owner();
   const ParameterValues model_values =
@@ -57,6 +57,14 @@ RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_value
   if (!std::ranges::equal(model_values.list(), recipe_values.list(), {}, &ParameterInfo::name, &ParameterInfo::name)) {
     throw reader.at("model").error("'" + row.model + "' has other parameters than " + recipe_values.owner(),
                                    "name a variant of the recipe's model");
+  }
+  if (reader.has("fixed")) {
+    ParameterValues values = model_values;
+    set_parameters(values, reader.at("fixed"));
+    for (const auto& [name, member] : reader.at("fixed").members()) {
+      const std::span<const double> value = values.components(values.info(name));
+      row.fixed.emplace_back(name, std::vector(value.begin(), value.end()));
+    }
   }
   row.name = reader.at("name").text();
   row.views = reader.at("views").text();
@@ -71,10 +79,10 @@ RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_value
   const JsonReader grid = reader.at("grid");
   if (grid.value().is_string()) {
     row.grid_name = grid.text();
-    row.grid = in_file(grid, [&] { return Grid::named_or_file(row.grid_name); });
+    row.grid = in_file(grid, [&] { return Grid::named_or_file(row.grid_name, find_reference(row.reference).sphere); });
   } else {
     row.grid_name = row.name;
-    row.grid = Grid::from_json(grid);
+    row.grid = Grid::from_json(grid, find_reference(row.reference).sphere);
   }
   if (row.views == "normal_slice" && row.grid.theta_o.values != std::vector{0.0}) {
     throw grid.error("a normal_slice has views that are not normal", "write \"theta_o\": [0]");
@@ -186,7 +194,8 @@ RecipeKind recipe_kind(const std::filesystem::path& path) {
   const JsonReader kind = reader.at("kind");
   const auto found = std::ranges::find(recipe_kind_names, kind.text());
   if (found == recipe_kind_names.end()) {
-    throw kind.error("unknown kind '" + kind.text() + "'", "choose constants, curves or substrate_rules");
+    throw kind.error("unknown kind '" + kind.text() + "'",
+                     "choose constants, curves, substrate_rules or approximations");
   }
   return static_cast<RecipeKind>(found - recipe_kind_names.begin());
 }
@@ -296,6 +305,7 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
         published.set(name, recipe.fixed.components(recipe.fixed.info(name)));
       }
       for (const auto& [name, value] : recipe.published) published.set(name, value);
+      for (const auto& [name, value] : row.fixed) published.set(name, value);
       const std::vector<float> published_values = TableModel(model, published, table).render().values;
       std::vector<RivalScore> rivals;
       for (const Rival& rival : recipe.rivals) rivals.push_back(score(rival, table, row, weights, monitor));

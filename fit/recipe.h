@@ -4,7 +4,7 @@
 // parameters to free on it. Every row is run on a Monte Carlo table and on an exact one; rivals are scored on the same
 // tables. data/recipes/proxima.json is the worked example, data/schemas/recipe.json the schema.
 //
-// Recipes of another kind are in curve_recipe.h.
+// Recipes of other kinds are in curve_recipe.h, substrate_rules.h and approximation_recipe.h.
 #pragma once
 
 #include <filesystem>
@@ -17,8 +17,9 @@
 
 namespace lobefit {
 
-enum class RecipeKind { constants, curves, substrate_rules };
-inline constexpr std::array<std::string_view, 3> recipe_kind_names{"constants", "curves", "substrate_rules"};
+enum class RecipeKind { constants, curves, substrate_rules, approximations };
+inline constexpr std::array<std::string_view, 4> recipe_kind_names{"constants", "curves", "substrate_rules",
+                                                                   "approximations"};
 /// What a recipe's "kind" says; without one it is of constants. Throws Error(invalid_input).
 RecipeKind recipe_kind(const std::filesystem::path& path);
 
@@ -35,6 +36,7 @@ struct RecipeRow {
   std::string name;
   std::string views;  // "all" or "normal_slice"
   std::string model;  // the recipe's, or a variant of it with the same parameters
+  std::vector<std::pair<std::string, std::vector<double>>> fixed;  // of the model, whatever the recipe says
   std::string reference;
   ParameterValues reference_values;
   std::string grid_name;  // as the recipe gives it, for the record
