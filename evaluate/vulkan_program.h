@@ -1,0 +1,27 @@
+// Compute programs for vulkan_device.h: what the buffers hold, as texts around the statements for one item.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lobefit {
+
+struct VulkanProgram {
+  std::vector<std::uint32_t> spirv;
+  std::size_t inputs, outputs;  // floats of an item
+};
+
+/// Items of a workgroup.
+inline constexpr std::uint32_t vulkan_group_size = 64;
+
+/// Bytes of the push constants first_item and item_count.
+inline constexpr std::uint32_t vulkan_push_bytes = 8;
+
+/// A whole compute shader, "glsl" or "hlsl": `definitions`, and `statements` for each item. They read input k of the
+/// item at lobefit_inputs[k * item_count + i] and any of lobefit_constants, and write lobefit_outputs like inputs; i
+/// counts the items of a chunk, first_item + i all items.
+std::string vulkan_shader(std::string_view language, const std::string& definitions, const std::string& statements);
+
+}  // namespace lobefit
