@@ -30,20 +30,33 @@ std::string model_text(const Model& model, std::string_view language) {
   return print_shader(find_float_model(model.info->name).trace(), language, *model.info, parameters, {});
 }
 
-std::string evaluation_shader(const Model& model, std::string_view language, const std::string& text,
-                              std::size_t parameter_sets, std::size_t block_size) {
+EvaluationShader evaluation_shader(const Model& model, std::string_view language, const std::string& model_text,
+                                   const ParameterBlocks& parameters) {
+  std::vector<VulkanArray> arrays;
+  std::vector<float> constants;
+  std::string definitions;
+  for (const ShaderTable& table : find_float_model(model.info->name).trace().tables) {
+    definitions += "#define " + table_guard(table.name) + "\n";
+    arrays.push_back({table_array(table.name), table.entries.size()});
+    constants.insert(constants.end(), table.entries.begin(), table.entries.end());
+  }
+  const std::size_t sets = parameters.sets.size(), slots = parameters.sets[0].size();
+  if (slots > 0) arrays.push_back({"lobefit_parameters", sets * slots});
+  for (const std::vector<float>& set : parameters.sets) constants.insert(constants.end(), set.begin(), set.end());
+  if (arrays.empty()) arrays.push_back({"lobefit_unused", 1});
+
   const std::string vector(find_shader_language(language).vector), name = "Lobefit_" + std::string(model.info->name);
-  const std::size_t slots = model.defaults().flat().size();
-  std::string statements = "    uint first_slot = (first_item + i) / " + std::to_string(block_size) + "u % " +
-                           std::to_string(parameter_sets) + "u * " + std::to_string(slots) + "u;\n    " + name +
-                           "_Parameters p;\n";
+  std::string statements = "    uint set = (first_item + i) / " + std::to_string(parameters.block_size) + "u % " +
+                           std::to_string(sets) + "u;\n    uint slot = set * " + std::to_string(slots) + "u;\n    " +
+                           name + "_Parameters p;\n";
   for (const ParameterInfo& info : model.parameters) {
-    const auto slot = [&](int component) { return "first_slot + " + std::to_string(info.offset + component) + "u"; };
+    const auto slot = [&](int component) { return "slot + " + std::to_string(info.offset + component) + "u"; };
     statements += "    p." + std::string(info.name) + " = " +
-                  (info.components == 3 ? triple(vector, "lobefit_constants", {slot(0), slot(1), slot(2)})
-                                        : "lobefit_constants[" + slot(0) + "]") +
+                  (info.components == 3 ? triple(vector, "lobefit_parameters", {slot(0), slot(1), slot(2)})
+                                        : "lobefit_parameters[" + slot(0) + "]") +
                   ";\n";
   }
+  if (model.parameters.empty()) statements += "    p.unused = 0.0;\n";
   statements += "    " + vector + " brdf = " + name + "(" +
                 triple(vector, "lobefit_inputs", {plane(0), plane(1), plane(2)}) + ", " +
                 triple(vector, "lobefit_inputs", {plane(3), plane(4), plane(5)}) + ", p);\n";
@@ -51,7 +64,7 @@ std::string evaluation_shader(const Model& model, std::string_view language, con
   for (const char* component : {"x", "y", "z"}) {
     statements += "    lobefit_outputs[" + plane(k++) + "] = brdf." + component + ";\n";
   }
-  return vulkan_shader(language, text, statements);
+  return {vulkan_shader(language, arrays, definitions + model_text, statements), std::move(constants)};
 }
 
 VulkanEvaluator::VulkanEvaluator(const VulkanDevice& device, std::string_view language)
@@ -65,14 +78,11 @@ double VulkanEvaluator::evaluate(const Model& model, const ParameterBlocks& para
 
 double VulkanEvaluator::evaluate_text(const Model& model, const std::string& text, const ParameterBlocks& parameters,
                                       const FloatPairs& pairs, FloatRgb& values) const {
-  const std::string shader =
-      evaluation_shader(model, language(), text, parameters.sets.size(), parameters.block_size);
-  std::vector<float> constants;
-  for (const std::vector<float>& set : parameters.sets) constants.insert(constants.end(), set.begin(), set.end());
+  const EvaluationShader shader = evaluation_shader(model, language(), text, parameters);
   const std::array<std::span<const float>, inputs> in{pairs.wi_x, pairs.wi_y, pairs.wi_z,
                                                       pairs.wo_x, pairs.wo_y, pairs.wo_z};
   const std::array<std::span<float>, outputs> out{values.r, values.g, values.b};
-  return device_.run({compile_shader(language(), shader), inputs, outputs}, constants, in, out);
+  return device_.run({compile_shader(language(), shader.text), inputs, outputs}, shader.constants, in, out);
 }
 
 }  // namespace lobefit

@@ -21,11 +21,16 @@ class VulkanEvaluator : public FloatDevice {
   const VulkanDevice& device_;
 };
 
-/// The model's exported function, with its defaults in Fitted().
+/// The model's exported text, with its defaults in Fitted().
 std::string model_text(const Model& model, std::string_view language);
 
-/// A compute shader around that text: pairs of directions come in, parameters are constants, BRDFs go out.
-std::string evaluation_shader(const Model& model, std::string_view language, const std::string& text,
-                              std::size_t parameter_sets, std::size_t block_size);
+/// A compute shader around such a text: pairs of directions come in, tables and parameter sets are constants, BRDFs go
+/// out. The text's tables give way to a buffer: software drivers take minutes to compile constant arrays.
+struct EvaluationShader {
+  std::string text;
+  std::vector<float> constants;
+};
+EvaluationShader evaluation_shader(const Model& model, std::string_view language, const std::string& model_text,
+                                   const ParameterBlocks& parameters);
 
 }  // namespace lobefit
