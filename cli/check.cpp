@@ -161,8 +161,7 @@ void add_check(CLI::App& app, Context& context) {
                    "simd; vulkan, the exported shader on the first device, a GPU before a CPU; vulkan:INDEX or "
                    "vulkan:NAME, another one, by a part of its name; or all")
       ->capture_default_str();
-  verb->add_option("--lang", a->language,
-                   "Of the shader: glsl, hlsl or all (default: glsl; with --device all both)")
+  verb->add_option("--lang", a->language, "Of the shader: glsl, hlsl or all (default: glsl; with --device all both)")
       ->check(CLI::IsMember({"glsl", "hlsl", "all"}));
   verb->add_flag("--list-devices", a->list_devices, "Name the devices that there are")->excludes(name)->excludes(all);
   verb->add_option("--pairs", a->options.pairs, "Pairs of directions")

@@ -29,8 +29,8 @@ std::string literal_text(double value);
 /// The constants and guards before everything else.
 std::string shader_prologue();
 
-/// The name of a table's array, and the macro that keeps its definition out of the text: a shader that has the array from
-/// elsewhere, such as a buffer, defines it.
+/// The name of a table's array, and the macro that keeps its definition out of the text: a shader that has the array
+/// from elsewhere, such as a buffer, defines it.
 std::string table_array(std::string_view table);
 std::string table_guard(std::string_view table);
 

@@ -28,7 +28,7 @@ std::string line_of(const std::string& text, int number) {
 
 /// From a log such as "ERROR: 0:12: 'x' : undeclared identifier", or in HLSL "ERROR: (12): …".
 Error complaint(std::string_view language, const std::string& text, const std::string& log) {
-  static const std::regex pattern(R"(ERROR: (?:[^\n]*?:|\()(\d+)\)?: *([^\n]*))");
+  static const std::regex pattern(R"(ERROR: (?:[^\n]*?:|\()(\d+)\)?: *([^\n]*?) *(?:\n|$))");
   std::smatch match;
   const bool found = std::regex_search(log, match, pattern);
   const std::string first = found ? match[2].str() : log.substr(0, log.find('\n'));
@@ -42,8 +42,8 @@ Error complaint(std::string_view language, const std::string& text, const std::s
 std::vector<std::uint32_t> compile_shader(std::string_view language, const std::string& text) {
   static const Compiler compiler;
   const bool hlsl = language == "hlsl";
-  const auto messages = static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules |
-                                                 (hlsl ? EShMsgReadHlsl : EShMsgDefault));
+  const auto messages =
+      static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules | (hlsl ? EShMsgReadHlsl : EShMsgDefault));
   const char* source = text.c_str();
   glslang::TShader shader(EShLangCompute);
   shader.setStrings(&source, 1);

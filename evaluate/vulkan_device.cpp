@@ -155,13 +155,18 @@ struct VulkanDevice::Parts {
       const vk::DeviceQueueCreateInfo queue_info({}, family, 1, &priority);
       vk::raii::Device device(physical, vk::DeviceCreateInfo({}, queue_info));
       vk::raii::Queue queue(device, family, 0);
-      vk::raii::CommandPool pool(device,
-                                 vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient, family));
+      vk::raii::CommandPool pool(device, vk::CommandPoolCreateInfo(vk::CommandPoolCreateFlagBits::eTransient, family));
       const std::uint32_t timestamp_bits = physical.getQueueFamilyProperties()[family].timestampValidBits;
       const vk::PhysicalDeviceLimits limits = physical.getProperties().limits;
-      return Parts{std::move(instance), std::move(physical), info,
-                   limits,              std::min(storage_range, info.storage_range), timestamp_bits,
-                   std::move(device),   std::move(queue),                            std::move(pool)};
+      return Parts{std::move(instance),
+                   std::move(physical),
+                   info,
+                   limits,
+                   std::min(storage_range, info.storage_range),
+                   timestamp_bits,
+                   std::move(device),
+                   std::move(queue),
+                   std::move(pool)};
     });
   }
 
@@ -191,7 +196,6 @@ struct VulkanDevice::Parts {
     return buffer(bytes, eTransferSrc | eTransferDst,
                   vk::MemoryPropertyFlagBits::eHostVisible | vk::MemoryPropertyFlagBits::eHostCoherent);
   }
-
 };
 
 namespace {
@@ -327,8 +331,8 @@ class VulkanDevice::Job {
   }
 
   double stamped_seconds() const {
-    const auto [status, ticks] = stamps_.getResults<std::uint64_t>(
-        0, 2, 2 * sizeof(std::uint64_t), sizeof(std::uint64_t), vk::QueryResultFlagBits::e64);
+    const auto [status, ticks] = stamps_.getResults<std::uint64_t>(0, 2, 2 * sizeof(std::uint64_t),
+                                                                   sizeof(std::uint64_t), vk::QueryResultFlagBits::e64);
     // Counters of fewer bits wrap around.
     const std::uint64_t mask = ~std::uint64_t{0} >> (64 - parts_.timestamp_bits);
     return static_cast<double>((ticks[1] - ticks[0]) & mask) * parts_.limits.timestampPeriod * 1e-9;
@@ -355,7 +359,8 @@ double VulkanDevice::run(const VulkanProgram& program, std::span<const float> co
                          std::span<const std::span<const float>> inputs,
                          std::span<const std::span<float>> outputs) const {
   const std::size_t items = outputs[0].size();
-  const std::size_t chunk = std::min(items, chunk_items(program, parts_->storage_range, parts_->limits.maxComputeWorkGroupCount[0]));
+  const std::size_t chunk =
+      std::min(items, chunk_items(program, parts_->storage_range, parts_->limits.maxComputeWorkGroupCount[0]));
   if (chunk == 0 || constants.size_bytes() > parts_->storage_range) {
     throw Error(ExitCode::missing_part,
                 "the storage buffers of " + parts_->info.name + " hold " + std::to_string(parts_->storage_range) +

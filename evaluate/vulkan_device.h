@@ -13,10 +13,10 @@
 namespace lobefit {
 
 struct VulkanDeviceInfo {
-  int index;           // in the loader's order
-  std::string name;    // such as "llvmpipe (LLVM 15.0.6, 256 bits)"
-  std::string driver;  // its name and version; "" where the device doesn't tell
-  bool software;       // VK_PHYSICAL_DEVICE_TYPE_CPU
+  int index;                    // in the loader's order
+  std::string name;             // such as "llvmpipe (LLVM 15.0.6, 256 bits)"
+  std::string driver;           // its name and version; "" where the device doesn't tell
+  bool software;                // VK_PHYSICAL_DEVICE_TYPE_CPU
   std::uint64_t storage_range;  // largest storage buffer, bytes
 };
 
@@ -34,10 +34,10 @@ class VulkanDevice {
 
   const VulkanDeviceInfo& info() const;
 
-  /// Runs the program over items, in as many chunks as the storage range asks for. `inputs` and `outputs` have one plane
-  /// for each float of an item. Returns the seconds in the shader: by the device's timestamps where it has them, else
-  /// by the clock; the first chunk runs once more before, to warm up. Throws Error(missing_part) if one item is too much
-  /// for the storage range, or for the device's memory; Error(failure) if the device fails.
+  /// Runs the program over items, in as many chunks as the storage range asks for. `inputs` and `outputs` have one
+  /// plane for each float of an item. Returns the seconds in the shader: by the device's timestamps where it has them,
+  /// else by the clock; the first chunk runs once more before, to warm up. Throws Error(missing_part) if one item is
+  /// too much for the storage range, or for the device's memory; Error(failure) if the device fails.
   double run(const VulkanProgram& program, std::span<const float> constants,
              std::span<const std::span<const float>> inputs, std::span<const std::span<float>> outputs) const;
 

@@ -26,7 +26,8 @@ layout(std430, binding = 2) writeonly buffer LobefitOutputs { float lobefit_outp
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= item_count) return;
-)" + statements + "}\n";
+)" + statements +
+         "}\n";
 }
 
 /// A constant array is a member of a buffer's one element: a macro gives it its name back.
@@ -48,7 +49,8 @@ struct LobefitConstants {
 void main(uint3 id : SV_DispatchThreadID) {
     uint i = id.x;
     if (i >= item_count) return;
-)" + statements + "}\n";
+)" + statements +
+         "}\n";
 }
 
 }  // namespace
