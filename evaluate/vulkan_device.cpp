@@ -20,7 +20,8 @@ using Seconds = std::chrono::duration<double>;
 
 Error no_vulkan(const std::string& what) {
   return {ExitCode::missing_part, what, "--device vulkan",
-          "install a Vulkan driver (Debian: mesa-vulkan-drivers has one for the CPU), or use --device simd"};
+          "install a GPU's driver, or Debian's libvulkan1 and mesa-vulkan-drivers, which has one for the CPU; or use "
+          "--device simd"};
 }
 
 /// What the driver could not do, as an Error.
@@ -29,7 +30,8 @@ auto guarded(Work&& work) {
   try {
     return work();
   } catch (const vk::OutOfDeviceMemoryError& error) {
-    throw Error(ExitCode::missing_part, "the Vulkan device is out of memory", error.what(), "use fewer --pairs");
+    throw Error(ExitCode::missing_part, "the Vulkan device is out of memory", error.what(),
+                "stop what else uses it, or choose another --device");
   } catch (const vk::SystemError& error) {
     throw Error(ExitCode::failure, "the Vulkan device failed", error.what(), "try another --device");
   }
