@@ -235,10 +235,6 @@ vk::raii::Pipeline compute_pipeline(const vk::raii::Device& device, const vk::ra
   return {device, nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout)};
 }
 
-}  // namespace
-
-namespace {
-
 /// How many items a chunk holds; 0 if not one.
 std::size_t chunk_items(const VulkanProgram& program, std::uint64_t storage_range, std::uint32_t max_groups) {
   const std::uint64_t widest = std::max(program.inputs, program.outputs) * sizeof(float);

@@ -72,11 +72,9 @@ std::vector<ParameterValues> all_varied(const Model& model) {
 
 // ---- texts ------------------------------------------------------------------------------------------------------
 
-class ShaderOnVulkan : public Vulkan, public ::testing::WithParamInterface<std::tuple<std::string, std::string>> {
+class ShaderOnVulkan : public Vulkan, public ::testing::WithParamInterface<std::string> {
  protected:
-  const Model& model_ = find_model(std::get<0>(GetParam()));
-  const std::string language_ = std::get<1>(GetParam());
-  Monitor silent_;
+  const Model& model_ = find_model(GetParam());
 };
 
 std::vector<std::string> model_names() {
@@ -85,30 +83,69 @@ std::vector<std::string> model_names() {
   return names;
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, ShaderOnVulkan,
-                         ::testing::Combine(::testing::ValuesIn(model_names()),
-                                            ::testing::ValuesIn(shader_languages())),
-                         [](const auto& test) { return std::get<0>(test.param) + "_" + std::get<1>(test.param); });
+INSTANTIATE_TEST_SUITE_P(Models, ShaderOnVulkan, ::testing::ValuesIn(model_names()),
+                         [](const auto& test) { return test.param; });
 
 TEST_P(ShaderOnVulkan, EqualsTheModel) {
-  const VulkanEvaluator evaluator(device(), language_);
-  const CheckResult result = check_model(model_, all_varied(model_), few_pairs(), evaluator, silent_);
-  EXPECT_TRUE(result.passed) << result.json().dump(2);
-  EXPECT_EQ(result.language, language_);
-  EXPECT_EQ(result.device, device().info().name);
-  EXPECT_GT(result.evaluations_per_s, 0.0);
+  Monitor silent;
+  for (const std::string& language : shader_languages()) {
+    const VulkanEvaluator evaluator(device(), language);
+    const CheckResult result = check_model(model_, all_varied(model_), few_pairs(), evaluator, silent);
+    EXPECT_TRUE(result.passed) << result.json().dump(2);
+    EXPECT_EQ(result.language, language);
+    EXPECT_EQ(result.device, device().info().name);
+    EXPECT_GT(result.evaluations_per_s, 0.0);
+  }
 }
 
-TEST_P(ShaderOnVulkan, IsValidSpirv) {
-  const ParameterBlocks parameters{{std::vector<float>(model_.defaults().flat().size())}, 64};
-  const std::vector<std::uint32_t> spirv =
-      compile_shader(language_, evaluation_shader(model_, language_, model_text(model_, language_), parameters).text);
-  spvtools::SpirvTools tools(SPV_ENV_VULKAN_1_0);
-  std::string complaints;
-  tools.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t&, const char* message) {
-    complaints += std::string(message) + "\n";
-  });
-  EXPECT_TRUE(tools.Validate(spirv)) << complaints;
+/// The one plane that `statements` write for `items` items, with `text` before them.
+std::vector<float> plane_of(const VulkanDevice& device, const std::string& language, const std::string& text,
+                            const std::string& statements, std::size_t items) {
+  const std::string shader = vulkan_shader(language, std::vector<VulkanArray>{{"unused", 1}}, text, statements);
+  const std::vector<float> input(items), constants(1);
+  std::vector<float> output(items);
+  const std::array<std::span<const float>, 1> in{input};
+  const std::array<std::span<float>, 1> out{output};
+  device.run({compile_shader(language, shader), 1, 1}, constants, in, out);
+  return output;
+}
+
+// EqualsTheModel has parameters and tables from a buffer; these are what the text itself holds.
+
+TEST_F(Vulkan, FittedReturnsTheParameters) {
+  for (const Model& model : models()) {
+    const ParameterValues defaults = model.defaults();
+    if (defaults.flat().empty()) continue;
+    const std::string name = "Lobefit_" + std::string(model.info->name);
+    std::string statements = "    " + name + "_Parameters p = " + name + "_Fitted();\n";
+    for (const ParameterInfo& info : model.parameters) {
+      for (int k = 0; k < info.components; ++k) {
+        const std::string member = std::string(info.name) + (info.components == 3 ? std::string{'.', "xyz"[k]} : "");
+        statements += "    if (i == " + std::to_string(info.offset + k) + "u) lobefit_outputs[i] = p." + member + ";\n";
+      }
+    }
+    const std::vector<float> rounded(defaults.flat().begin(), defaults.flat().end());
+    for (const std::string& language : shader_languages()) {
+      EXPECT_EQ(plane_of(device(), language, model_text(model, language), statements, rounded.size()), rounded) << name;
+    }
+  }
+}
+
+TEST_F(Vulkan, TablesAreInTheText) {
+  int tables = 0;
+  for (const Model& model : models()) {
+    const Shader shader = find_float_model(model.info->name).trace();
+    for (const ShaderTable& table : shader.tables) {
+      const std::string statement = "    lobefit_outputs[i] = Lobefit_" + table.name + "_entries[i];\n";
+      for (const std::string& language : shader_languages()) {
+        const std::vector<float> found =
+            plane_of(device(), language, model_text(model, language), statement, table.entries.size());
+        EXPECT_TRUE(std::ranges::equal(found, table.entries)) << table.name << " in " << language;
+      }
+      ++tables;
+    }
+  }
+  EXPECT_GE(tables, 5);
 }
 
 /// `text` with its one `from` made `to`.
@@ -154,8 +191,8 @@ TEST_F(Vulkan, AnotherConstantIsCaught) {
 TEST_F(Vulkan, ValuesThatAreNotFiniteAreFailures) {
   const Model& model = find_model("lambert");
   Monitor silent;
-  const TamperedEvaluator other(
-      device(), "glsl", replaced(model_text(model, "glsl"), "/ LOBEFIT_PI", "/ max(wi.z - 0.5, 0.0)"));
+  const TamperedEvaluator other(device(), "glsl",
+                                replaced(model_text(model, "glsl"), "/ LOBEFIT_PI", "/ max(wi.z - 0.5, 0.0)"));
   const CheckResult result = check_model(model, {model.defaults()}, few_pairs(), other, silent);
   EXPECT_FALSE(result.passed);
   EXPECT_GT(result.non_finite, result.pairs / 4);
@@ -251,6 +288,22 @@ TEST_F(Vulkan, DevicesAreChosenByIndexAndByName) {
 }
 
 // ---- the compiler: without a device -------------------------------------------------------------------------------
+
+TEST(Spirv, EveryShaderIsValid) {
+  spvtools::SpirvTools tools(SPV_ENV_VULKAN_1_0);
+  std::string complaints;
+  tools.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t&, const char* message) {
+    complaints += std::string(message) + "\n";
+  });
+  for (const Model& model : models()) {
+    const ParameterBlocks parameters{{std::vector<float>(model.defaults().flat().size())}, 64};
+    for (const std::string& language : shader_languages()) {
+      const std::vector<std::uint32_t> spirv =
+          compile_shader(language, evaluation_shader(model, language, model_text(model, language), parameters).text);
+      EXPECT_TRUE(tools.Validate(spirv)) << model.info->name << " in " << language << ": " << complaints;
+    }
+  }
+}
 
 TEST(Spirv, ComplaintsQuoteTheLine) {
   const std::string body = "    lobefit_outputs[i] = 1.0;\n    lobefit_outputs[i] = wrong_name * 2.0;\n";
