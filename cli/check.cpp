@@ -140,7 +140,7 @@ std::string worst_text(const CheckResult& r) {
 void add_check(CLI::App& app, Context& context) {
   CLI::App* verb = app.add_subcommand(
       "check",
-      "Run a model as a GPU would (vectorised float) against double precision, and against a table\n"
+      "Run a model as a GPU would (vectorised float, or its shader by Vulkan) against double precision and a table\n"
       "  lobefit check fit.json --table truth.exr\n"
       "  lobefit check --all\n"
       "  lobefit check --all --device vulkan --lang all      the exported shaders, on a Vulkan device\n"

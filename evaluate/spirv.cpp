@@ -4,7 +4,8 @@
 #include <glslang/Public/ShaderLang.h>
 #include <glslang/SPIRV/GlslangToSpv.h>
 
-#include <regex>
+#include <algorithm>
+#include <cstdio>
 #include <sstream>
 
 #include "models/error.h"
@@ -26,15 +27,14 @@ std::string line_of(const std::string& text, int number) {
   return line.substr(std::min(line.find_first_not_of(' '), line.size()));
 }
 
-/// From a log such as "ERROR: 0:12: 'x' : undeclared identifier", or in HLSL "ERROR: (12): …".
+/// From a log that starts as "ERROR: 0:12: 'x' : undeclared identifier".
 Error complaint(std::string_view language, const std::string& text, const std::string& log) {
-  static const std::regex pattern(R"(ERROR: (?:[^\n]*?:|\()(\d+)\)?: *([^\n]*?) *(?:\n|$))");
-  std::smatch match;
-  const bool found = std::regex_search(log, match, pattern);
-  const std::string first = found ? match[2].str() : log.substr(0, log.find('\n'));
-  const std::string where = found ? "line " + match[1].str() + ": " + line_of(text, std::stoi(match[1])) : "";
-  return {ExitCode::failure, "glslang refuses the " + std::string(language) + " text: " + first, where,
-          "please report it with the command line"};
+  std::string first = log.substr(0, log.find('\n'));
+  first.erase(first.find_last_not_of(' ') + 1);
+  int line = 0;
+  std::sscanf(first.c_str(), "ERROR: 0:%d:", &line);
+  return {ExitCode::failure, "glslang refuses the " + std::string(language) + " text: " + first,
+          line > 0 ? line_of(text, line) : "", "please report it with the command line"};
 }
 
 }  // namespace

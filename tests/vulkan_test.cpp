@@ -315,7 +315,7 @@ TEST(Spirv, ComplaintsQuoteTheLine) {
     const std::string message = error.what();
     EXPECT_TRUE(holds(message, language)) << message;
     EXPECT_TRUE(holds(message, "'wrong_name' : ")) << message;
-    EXPECT_TRUE(holds(message, "lobefit_outputs[i] = wrong_name * 2.0;")) << message;
+    EXPECT_TRUE(holds(message, "(lobefit_outputs[i] = wrong_name * 2.0;")) << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
 }
