@@ -160,8 +160,8 @@ bool check_fits(const RecipeResult& result, const Context& context, Monitor& mon
       std::ranges::copy(on_table.row(row), set.flat().begin());
       sets.push_back(std::move(set));
     }
-    CheckResult check = check_simd(on_table.model(), sets, {.seed = context.seed}, monitor);
-    check.table = check_against_table(on_table, table);
+    CheckResult check = check_model(on_table.model(), sets, {.seed = context.seed}, SimdDevice(), monitor);
+    check.table = check_against_table(on_table, table, SimdDevice());
     Json document = check.json();
     // A rate is not a result: the same run gives the same file.
     document.erase("evaluations_per_s");

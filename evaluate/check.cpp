@@ -3,8 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
-#include <numeric>
+#include <limits>
 
 #include "evaluate/conditioning.h"
 #include "reference/sample_points.h"
@@ -72,13 +71,11 @@ std::vector<ParameterValues> varied_parameters(const ParameterValues& values, co
   return sets;
 }
 
-CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& parameter_sets,
-                       const CheckOptions& options, Monitor& monitor) {
-  const FloatModel& float_model = find_float_model(model.info->name);
+CheckResult check_model(const Model& model, const std::vector<ParameterValues>& parameter_sets,
+                        const CheckOptions& options, const FloatDevice& device, Monitor& monitor) {
   const std::size_t n = options.pairs, blocks = (n + block_size - 1) / block_size;
-  const auto set_of = [&](std::size_t block) { return block % parameter_sets.size(); };
-  std::vector<std::vector<float>> float_sets;
-  for (const ParameterValues& set : parameter_sets) float_sets.push_back(rounded(set.flat()));
+  ParameterBlocks parameters{.sets = {}, .block_size = block_size};
+  for (const ParameterValues& set : parameter_sets) parameters.sets.push_back(rounded(set.flat()));
 
   monitor.begin("check " + std::string(model.info->name), blocks);
   FloatPairs pairs(n);
@@ -89,23 +86,14 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
   });
 
   FloatRgb values(n);
-  const auto evaluate = [&] {
-    tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
-      float_model.evaluate(float_sets[set_of(block)], pairs, block * block_size, std::min(n, (block + 1) * block_size),
-                           values);
-    });
-  };
-  evaluate();  // pages and caches warm, before the clock
-  const auto start = std::chrono::steady_clock::now();
-  evaluate();
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  const double seconds = device.evaluate(model, parameters, pairs, values);
 
   std::vector<float> relative(n, -1.0f);
   std::vector<BlockErrors> errors(blocks);
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
     monitor.check();
     BlockErrors& e = errors[block];
-    const std::vector<float>& set = float_sets[set_of(block)];
+    const std::vector<float>& set = parameters.sets[parameters.set_of(block * block_size)];
     const std::vector<double> flat(set.begin(), set.end());
     e.worst = block * block_size;
     for (std::size_t i = block * block_size; i < std::min(n, (block + 1) * block_size); ++i) {
@@ -154,7 +142,9 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
   monitor.end();
 
   CheckResult result;
-  result.device = "simd";
+  result.device = device.name();
+  result.language = device.language();
+  result.software = device.software();
   result.model = std::string(model.info->name);
   result.pairs = n;
   BlockErrors total;
@@ -188,21 +178,21 @@ CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& p
   result.non_finite = total.non_finite;
   result.worst_wi = pairs.wi(total.worst);
   result.worst_wo = pairs.wo(total.worst);
-  result.worst_parameters = parameter_sets[set_of(total.worst / block_size)];
-  result.evaluations_per_s = static_cast<double>(n) / elapsed.count();
+  result.worst_parameters = parameter_sets[parameters.set_of(total.worst)];
+  result.evaluations_per_s = static_cast<double>(n) / seconds;
   result.passed = result.failures == 0;
   return result;
 }
 
-CheckTable check_against_table(const TableModel& on_table, const Table& table) {
-  const FloatModel& float_model = find_float_model(on_table.model().info->name);
-  const std::size_t per_row = table.entries() / table.parameter_rows();
+CheckTable check_against_table(const TableModel& on_table, const Table& table, const FloatDevice& device) {
+  ParameterBlocks parameters{.sets = {}, .block_size = table.entries() / table.parameter_rows()};
+  for (std::size_t row = 0; row < table.parameter_rows(); ++row) {
+    parameters.sets.push_back(rounded(on_table.row(row)));
+  }
   FloatPairs pairs(table.entries());
   for (std::size_t entry = 0; entry < table.entries(); ++entry) pairs.set(entry, table.wi(entry), table.wo(entry));
   FloatRgb values(table.entries());
-  for (std::size_t row = 0; row < table.parameter_rows(); ++row) {
-    float_model.evaluate(rounded(on_table.row(row)), pairs, row * per_row, (row + 1) * per_row, values);
-  }
+  device.evaluate(on_table.model(), parameters, pairs, values);
   std::vector<float> planes(values.r);
   if (table.channels == 3) {
     planes.insert(planes.end(), values.g.begin(), values.g.end());
@@ -240,6 +230,7 @@ Json CheckResult::json() const {
                   {"wo_vector", vector(worst_wo)},
                   {"params", parameters}}},
                 {"evaluations_per_s", evaluations_per_s}};
+  if (!language.empty()) document["language"] = language;
   if (table) document["table"] = {{"rms_double", table->rms_double}, {"rms_float", table->rms_float}};
   document["passed"] = passed;
   return document;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluate/float_model.h"
+#include "evaluate/float_device.h"
 #include "reference/metric.h"
 #include "reference/monitor.h"
 #include "reference/table_model.h"
@@ -31,6 +31,7 @@ struct CheckTable {
 
 struct CheckResult {
   std::string device;
+  std::string language;  // of the shader; "" for SIMD code
   bool software = true;
   std::string model;
   std::uint64_t pairs = 0;
@@ -47,13 +48,13 @@ struct CheckResult {
   Json json() const;
 };
 
-/// Runs the vectorised float batch over random and hostile pairs (grazing, retro, mirror, normal), cycling through
-/// `parameter_sets`. Both sides see the same float32-rounded directions and parameters.
-CheckResult check_simd(const Model& model, const std::vector<ParameterValues>& parameter_sets,
-                       const CheckOptions& options, Monitor& monitor);
+/// Runs the device over random and hostile pairs (grazing, retro, mirror, normal), cycling through `parameter_sets`.
+/// Both sides see the same float32-rounded directions and parameters.
+CheckResult check_model(const Model& model, const std::vector<ParameterValues>& parameter_sets,
+                        const CheckOptions& options, const FloatDevice& device, Monitor& monitor);
 
-/// The float batch over a table's own grid.
-CheckTable check_against_table(const TableModel& on_table, const Table& table);
+/// The device over a table's own grid.
+CheckTable check_against_table(const TableModel& on_table, const Table& table, const FloatDevice& device);
 
 /// `count` parameter sets: `values`, then sets in which every parameter of `vary` is random in its range, each at a
 /// bound now and then.

@@ -29,11 +29,11 @@ const std::set<std::string>& reserved_names() {
 
 /// A constant array, eight entries a line.
 std::string table_text(const ShaderLanguage& language, const ShaderTable& table) {
-  const std::string guard = "LOBEFIT_TABLE_" + upper_case(table.name);
+  const std::string guard = table_guard(table.name);
   const std::string type = "float[" + std::to_string(table.entries.size()) + "]";
   std::string text = "#ifndef " + guard + "\n#define " + guard + "\n";
-  text += (language.has_initializer_lists ? "static const float " : "const float ") + ("Lobefit_" + table.name) +
-          "_entries" + type.substr(5) + " = " + (language.has_initializer_lists ? "{" : type + "(");
+  text += (language.has_initializer_lists ? "static const float " : "const float ") + table_array(table.name) +
+          type.substr(5) + " = " + (language.has_initializer_lists ? "{" : type + "(");
   for (std::size_t i = 0; i < table.entries.size(); ++i) {
     text += (i == 0 ? "" : ",") + std::string(i % 8 == 0 ? "\n    " : " ") + literal_text(table.entries[i]);
   }
@@ -82,6 +82,9 @@ std::string literal_text(double value) {
 }
 
 std::string shader_prologue() { return "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265\n#endif\n\n"; }
+
+std::string table_array(std::string_view table) { return "Lobefit_" + std::string(table) + "_entries"; }
+std::string table_guard(std::string_view table) { return "LOBEFIT_TABLE_" + upper_case(std::string(table)); }
 
 std::string struct_text(const ShaderLanguage& language, const std::string& name,
                         std::span<const ShaderParameter> parameters) {
@@ -217,7 +220,7 @@ std::string StatementPrinter::text(const ShaderNode& node, Precedence outer) con
       return outer > ternary ? "(" + inner + ")" : inner;
     }
     case Operation::call: return "Lobefit_" + node.name + "(" + list(node) + ")";
-    case Operation::entry: return "Lobefit_" + node.name + "_entries[int(" + text(*node.operands[0], ternary) + ")]";
+    case Operation::entry: return table_array(node.name) + "[int(" + text(*node.operands[0], ternary) + ")]";
     case Operation::intrinsic:
       if (node.name == "saturate" && !language_.has_saturate) return "clamp(" + list(node) + ", 0.0, 1.0)";
       return (node.name == "lerp" ? std::string(language_.lerp) : node.name) + "(" + list(node) + ")";

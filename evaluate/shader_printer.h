@@ -29,6 +29,11 @@ std::string literal_text(double value);
 /// The constants and guards before everything else.
 std::string shader_prologue();
 
+/// The name of a table's array, and the macro that keeps its definition out of the text: a shader that has the array
+/// from elsewhere, such as a buffer, defines it.
+std::string table_array(std::string_view table);
+std::string table_guard(std::string_view table);
+
 /// A struct of the parameters; once where several texts are joined.
 std::string struct_text(const ShaderLanguage& language, const std::string& name,
                         std::span<const ShaderParameter> parameters);

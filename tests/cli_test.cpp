@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -437,7 +438,62 @@ TEST_F(CommandLine, FitCheckExportHangTogether) {
   EXPECT_NE(shader.out.find("Lobefit_proxima_Fitted()"), std::string::npos);
   EXPECT_NE(shader.out.find("p.b = 0.11"), std::string::npos) << shader.out;
   expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl"});
-  expect_refused("check fit.json --device vulkan", 6, {"Vulkan"});
+}
+
+/// The Vulkan loader with no driver to offer, for a while.
+class NoVulkanDriver {
+ public:
+  NoVulkanDriver() {
+    for (const char* name : names_) setenv(name, "/nonexistent", 1);
+  }
+  ~NoVulkanDriver() {
+    for (const char* name : names_) unsetenv(name);
+  }
+
+ private:
+  static constexpr std::array names_{"VK_ICD_FILENAMES", "VK_DRIVER_FILES"};
+};
+
+TEST_F(CommandLine, CheckWithoutAVulkanDriverSaysSo) {
+  const NoVulkanDriver none;
+  expect_refused("check lambert --device vulkan", 6, {"Vulkan", "install", "--device simd"});
+  expect_refused("check lambert --device vulkan:0 --lang hlsl", 6, {"Vulkan"});
+  const Json devices = json("check --list-devices")["devices"];
+  ASSERT_EQ(devices.size(), 1u);
+  EXPECT_EQ(devices[0]["device"], "simd");
+  // All that there are; what is missing is said.
+  const Outcome all = run("check lambert --device all --pairs 4096 --json");
+  EXPECT_EQ(all.code, 0);
+  EXPECT_EQ(Json::parse(all.out)["device"], "simd");
+  EXPECT_NE(all.err.find("no Vulkan"), std::string::npos) << all.err;
+}
+
+TEST_F(CommandLine, CheckRefusesDevicesAndLanguagesThatAreNone) {
+  expect_refused("check lambert --device cuda", 2, {"'cuda'", "simd", "vulkan"});
+  expect_refused("check lambert --lang glsl", 2, {"--lang", "--device vulkan"});
+  expect_refused("check lambert --device vulkan --lang cg", 2, {"cg"});
+  expect_refused("check lambert --list-devices", 2, {"--list-devices"});
+  expect_refused("check lambert --device vulkan:no_such_device", 6, {"Vulkan"});
+}
+
+TEST_F(CommandLine, CheckRunsShadersOnVulkanDevices) {
+  const Json devices = json("check --list-devices")["devices"];
+  if (devices.size() < 2) GTEST_SKIP() << "no Vulkan device, or no Vulkan in this build";
+  const Json one = json("check proxima --device vulkan:0 --lang hlsl --pairs 65536");
+  EXPECT_EQ(one["device"], devices[1]["name"]);
+  EXPECT_EQ(one["software"], devices[1]["software"]);
+  EXPECT_EQ(one["language"], "hlsl");
+  EXPECT_TRUE(one["passed"]);
+  EXPECT_GT(one["evaluations_per_s"], 0.0);
+  const Json all = json("check proxima --device all --pairs 65536")["checks"];
+  EXPECT_EQ(all.size(), 1 + 2 * (devices.size() - 1));
+
+  // Over a table, whose rows are parameter sets: what the shader finds is what SIMD code finds, but for rounding.
+  ASSERT_EQ(run("render proxima --axis alpha=0.3,0.9 --grid small -o t.exr").code, 0);
+  const Json table = json("check proxima --table t.exr --device vulkan --pairs 4096")["table"];
+  EXPECT_LT(table["rms_double"], 1e-7);
+  EXPECT_GT(table["rms_float"], 0.0);
+  EXPECT_LT(table["rms_float"], 1e-6);
 }
 
 TEST_F(CommandLine, ExportToTheGBufferTellsWhatIsLost) {

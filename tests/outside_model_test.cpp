@@ -100,7 +100,7 @@ TEST_F(OutsideModel, IsChecked) {
   CheckOptions options;
   options.pairs = 1 << 14;
   const CheckResult result =
-      check_simd(model_, varied_parameters(model_.defaults(), {"albedo", "k"}, 8, 1), options, silent_);
+      check_model(model_, varied_parameters(model_.defaults(), {"albedo", "k"}, 8, 1), options, SimdDevice(), silent_);
   EXPECT_TRUE(result.passed);
   EXPECT_GT(result.max_rel, 0.0);
 }
