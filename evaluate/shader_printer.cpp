@@ -8,22 +8,86 @@ namespace lobefit {
 
 namespace {
 
-constexpr std::array languages{ShaderLanguage{"hlsl", "float3", "lerp", true, true},
-                               ShaderLanguage{"glsl", "vec3", "mix", false, false}};
+constexpr std::array languages{
+    ShaderLanguage{"hlsl", "float3", "float3", "lerp", true, true},
+    ShaderLanguage{"glsl", "vec3", "vec3", "mix", false, false},
+    ShaderLanguage{"c", "Lobefit_float3", "Lobefit_make3", "Lobefit_lerp", false, true, true}};
+
+/// What C lacks. Nothing warns where a text leaves one of them unused.
+constexpr std::string_view c_vectors = R"(#include <math.h>
+#include <stdbool.h>
+
+#ifndef LOBEFIT_FLOAT3
+#define LOBEFIT_FLOAT3
+typedef struct Lobefit_float3 {
+    float x, y, z;
+} Lobefit_float3;
+
+static inline Lobefit_float3 Lobefit_make3(float x, float y, float z) {
+    Lobefit_float3 v;
+    v.x = x;
+    v.y = y;
+    v.z = z;
+    return v;
+}
+static inline Lobefit_float3 Lobefit_splat3(float s) {
+    return Lobefit_make3(s, s, s);
+}
+static inline Lobefit_float3 Lobefit_add3(Lobefit_float3 a, Lobefit_float3 b) {
+    return Lobefit_make3(a.x + b.x, a.y + b.y, a.z + b.z);
+}
+static inline Lobefit_float3 Lobefit_subtract3(Lobefit_float3 a, Lobefit_float3 b) {
+    return Lobefit_make3(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+static inline Lobefit_float3 Lobefit_multiply3(Lobefit_float3 a, Lobefit_float3 b) {
+    return Lobefit_make3(a.x * b.x, a.y * b.y, a.z * b.z);
+}
+static inline Lobefit_float3 Lobefit_divide3(Lobefit_float3 a, Lobefit_float3 b) {
+    return Lobefit_make3(a.x / b.x, a.y / b.y, a.z / b.z);
+}
+static inline Lobefit_float3 Lobefit_scale3(Lobefit_float3 a, float s) {
+    return Lobefit_make3(a.x * s, a.y * s, a.z * s);
+}
+static inline Lobefit_float3 Lobefit_max3(Lobefit_float3 a, Lobefit_float3 b) {
+    return Lobefit_make3(fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z));
+}
+static inline float Lobefit_dot3(Lobefit_float3 a, Lobefit_float3 b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+static inline Lobefit_float3 Lobefit_normalize3(Lobefit_float3 a) {
+    return Lobefit_divide3(a, Lobefit_splat3(sqrtf(Lobefit_dot3(a, a))));
+}
+static inline float Lobefit_lerp(float a, float b, float t) {
+    return a + (b - a) * t;
+}
+static inline Lobefit_float3 Lobefit_lerp3(Lobefit_float3 a, Lobefit_float3 b, Lobefit_float3 t) {
+    return Lobefit_make3(Lobefit_lerp(a.x, b.x, t.x), Lobefit_lerp(a.y, b.y, t.y), Lobefit_lerp(a.z, b.z, t.z));
+}
+#endif
+
+)";
 
 std::string upper_case(std::string text) {
   for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   return text;
 }
 
-/// Names that a local must not take: the parameter struct's, and words that either language reserves or defines.
+/// Names that a local must not take: the parameter struct's, and words that some language reserves or defines; C is
+/// also read as C++.
 const std::set<std::string>& reserved_names() {
   static const std::set<std::string> names{
-      "p",      "half",      "double", "sample", "smooth",  "flat",  "shared",    "input",   "output",
-      "common", "partition", "active", "filter", "texture", "point", "line",      "linear",  "matrix",
-      "vector", "min",       "max",    "abs",    "floor",   "clamp", "lerp",      "mix",     "sqrt",
-      "exp",    "exp2",      "log",    "log2",   "pow",     "dot",   "normalize", "cross",   "length",
-      "step",   "fract",     "sign",   "mod",    "out",     "in",    "inout",     "discard", "saturate"};
+      "p",       "half",      "double",   "sample",  "smooth",    "flat",     "shared",    "input",   "output",
+      "common",  "partition", "active",   "filter",  "texture",   "point",    "line",      "linear",  "matrix",
+      "vector",  "min",       "max",      "abs",     "floor",     "clamp",    "lerp",      "mix",     "sqrt",
+      "exp",     "exp2",      "log",      "log2",    "pow",       "dot",      "normalize", "cross",   "length",
+      "step",    "fract",     "sign",     "mod",     "out",       "in",       "inout",     "discard", "saturate",
+      "auto",    "break",     "case",     "char",    "const",     "continue", "default",   "delete",  "do",
+      "else",    "enum",      "extern",   "float",   "for",       "goto",     "if",        "inline",  "int",
+      "long",    "new",       "register", "return",  "short",     "signed",   "sizeof",    "static",  "struct",
+      "switch",  "this",      "template", "class",   "typedef",   "union",    "unsigned",  "void",    "volatile",
+      "while",   "and",       "or",       "not",     "xor",       "operator", "private",   "public",  "protected",
+      "virtual", "friend",    "explicit", "using",   "namespace", "try",      "catch",     "throw",   "typename",
+      "bool",    "true",      "false",    "restrict"};
   return names;
 }
 
@@ -35,7 +99,7 @@ std::string table_text(const ShaderLanguage& language, const ShaderTable& table)
   text += (language.has_initializer_lists ? "static const float " : "const float ") + ("Lobefit_" + table.name) +
           "_entries" + type.substr(5) + " = " + (language.has_initializer_lists ? "{" : type + "(");
   for (std::size_t i = 0; i < table.entries.size(); ++i) {
-    text += (i == 0 ? "" : ",") + std::string(i % 8 == 0 ? "\n    " : " ") + literal_text(table.entries[i]);
+    text += (i == 0 ? "" : ",") + std::string(i % 8 == 0 ? "\n    " : " ") + literal_text(language, table.entries[i]);
   }
   return text + (language.has_initializer_lists ? "\n};\n#endif\n\n" : "\n);\n#endif\n\n");
 }
@@ -52,6 +116,12 @@ bool is_atom(const ShaderNode& node) {
 
 std::string value_type(const ShaderLanguage& language, ShaderType type) {
   return type == ShaderType::vector ? std::string(language.vector) : "float";
+}
+
+/// A traced function's name behind its prefix. Texts that are joined may hold one function on scalars and on vectors:
+/// these are told apart by their guards, and in C, which does not overload, by their names.
+std::string own_name(const std::string& name, ShaderType result) {
+  return result == ShaderType::vector ? name + "3" : name;
 }
 
 }  // namespace
@@ -72,21 +142,31 @@ const ShaderLanguage& find_shader_language(std::string_view name) {
               "choose one of " + known);
 }
 
-std::string literal_text(double value) {
+std::string literal_text(const ShaderLanguage& language, double value) {
   if (value == pi) return "LOBEFIT_PI";
   std::array<char, 32> buffer;
   const auto [end, code] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), static_cast<float>(value));
   std::string text(buffer.data(), end);
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
+  return language.is_c ? text + "f" : text;
 }
 
-std::string shader_prologue() { return "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265\n#endif\n\n"; }
+std::string shader_prologue(const ShaderLanguage& language) {
+  return (language.is_c ? std::string(c_vectors) : "") + "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265" +
+         (language.is_c ? "f" : "") + "\n#endif\n\n";
+}
+
+std::string function_head(const ShaderLanguage& language, std::string_view result, const std::string& name,
+                          const std::string& arguments) {
+  return (language.is_c ? "static inline " : "") + std::string(result) + " " + name + "(" +
+         (language.is_c && arguments.empty() ? "void" : arguments) + ") {\n";
+}
 
 std::string struct_text(const ShaderLanguage& language, const std::string& name,
                         std::span<const ShaderParameter> parameters) {
   const std::string guard = "LOBEFIT_STRUCT_" + upper_case(name);
-  std::string text = "#ifndef " + guard + "\n#define " + guard + "\nstruct " + name + " {\n";
+  std::string text = "#ifndef " + guard + "\n#define " + guard + "\n" +
+                     (language.is_c ? "typedef struct " : "struct ") + name + " {\n";
   for (const ShaderParameter& parameter : parameters) {
     const ParameterInfo& info = parameter.info;
     text += "    " + (info.components == 3 ? std::string(language.vector) : std::string("float")) + " " +
@@ -95,20 +175,21 @@ std::string struct_text(const ShaderLanguage& language, const std::string& name,
   }
   // GLSL has no empty structs.
   if (parameters.empty()) text += "    float unused;\n";
-  return text + "};\n#endif\n\n";
+  return text + (language.is_c ? "} " + name : "}") + ";\n#endif\n\n";
 }
 
 std::string values_text(const ShaderLanguage& language, const std::string& type, const std::string& function,
                         std::span<const ShaderParameter> parameters) {
-  std::string text = type + " " + function + "() {\n    " + type + " p;\n";
+  std::string text = function_head(language, type, function, "") + "    " + type + " p;\n";
   for (const ShaderParameter& parameter : parameters) {
     std::string value;
-    for (const double component : parameter.value) value += (value.empty() ? "" : ", ") + literal_text(component);
-    if (parameter.value.size() == 3) value = std::string(language.vector) + "(" + value + ")";
+    for (const double component : parameter.value)
+      value += (value.empty() ? "" : ", ") + literal_text(language, component);
+    if (parameter.value.size() == 3) value = std::string(language.constructor) + "(" + value + ")";
     text += "    p." + std::string(parameter.info.name) + " = " + value + ";" +
             (parameter.comment.empty() ? "" : "  // " + parameter.comment) + "\n";
   }
-  if (parameters.empty()) text += "    p.unused = 0.0;\n";
+  if (parameters.empty()) text += "    p.unused = " + literal_text(language, 0.0) + ";\n";
   return text + "    return p;\n}\n";
 }
 
@@ -116,19 +197,21 @@ std::string definitions_text(const ShaderLanguage& language, const Shader& shade
   std::string text;
   for (const ShaderTable& table : shader.tables) text += table_text(language, table);
   for (const ShaderFunction& function : shader.functions) {
-    const std::string guard = "LOBEFIT_FUNCTION_" + upper_case(function.name);
+    const std::string guard = "LOBEFIT_FUNCTION_" + upper_case(own_name(function.name, function.result->type));
     std::string arguments;
     for (const ShaderArgument& argument : function.arguments) {
       arguments += (arguments.empty() ? "" : ", ") + value_type(language, argument.type) + " " + argument.name;
     }
-    text += "#ifndef " + guard + "\n#define " + guard + "\n" + value_type(language, function.result->type) +
-            " Lobefit_" + function.name + "(" + arguments + ") {\n" + body_text(language, function) + "}\n#endif\n\n";
+    text += "#ifndef " + guard + "\n#define " + guard + "\n" +
+            function_head(language, value_type(language, function.result->type),
+                          "Lobefit_" + (language.is_c ? own_name(function.name, function.result->type) : function.name),
+                          arguments) +
+            body_text(language, function) + "}\n#endif\n\n";
   }
   return text;
 }
 
-std::string body_text(const ShaderLanguage& language, const ShaderFunction& function) {
-  std::vector<std::string> taken;
+std::string body_text(const ShaderLanguage& language, const ShaderFunction& function, std::vector<std::string> taken) {
   for (const ShaderArgument& argument : function.arguments) taken.push_back(argument.name);
   const StatementPrinter printer(language, std::span(&function.result, 1), taken);
   return printer.statements() + "    return " + printer.text(*function.result) + ";\n";
@@ -143,6 +226,14 @@ StatementPrinter::StatementPrinter(const ShaderLanguage& language, std::span<con
   std::sort(reachable.begin(), reachable.end(), [](auto* a, auto* b) { return a->order < b->order; });
   taken_ = reserved_names();
   taken_.insert(taken.begin(), taken.end());
+  if (language.is_c) {
+    for (const std::string& name : taken) {
+      const auto reads = [&](const ShaderNode* node) {
+        return node->operation == Operation::input && (node->name == name || node->name.starts_with(name + "."));
+      };
+      if (std::none_of(reachable.begin(), reachable.end(), reads)) statements_ += "    (void)" + name + ";\n";
+    }
+  }
   std::map<const ShaderNode*, const ShaderNode*> let_of;
   for (const ShaderNode* node : reachable) {
     if (node->operation == Operation::let) let_of.emplace(node->operands[0], node);
@@ -186,19 +277,20 @@ std::string StatementPrinter::text(const ShaderNode& node, Precedence outer) con
   const auto named = names_.find(&node);
   if (named != names_.end()) return named->second;
   const auto binary = [&](const char* symbol, Precedence own) {
+    if (language_.is_c && node.type == ShaderType::vector) return vector_call(node);
     // The right operand binds one step tighter: the order of rounding in the graph is kept.
     const std::string inner = text(*node.operands[0], own) + symbol + text(*node.operands[1], Precedence(own + 1));
     return own < outer ? "(" + inner + ")" : inner;
   };
   switch (node.operation) {
     case Operation::literal: {
-      const std::string digits = literal_text(node.literal);
+      const std::string digits = literal_text(language_, node.literal);
       return node.literal < 0.0 && outer > sum ? "(" + digits + ")" : digits;
     }
     case Operation::input: return node.name;
     case Operation::component: return text(*node.operands[0], primary) + "." + node.name;
     case Operation::let: return text(*node.operands[0], outer);
-    case Operation::construct: return std::string(language_.vector) + "(" + list(node) + ")";
+    case Operation::construct: return std::string(language_.constructor) + "(" + list(node) + ")";
     case Operation::add: return binary(" + ", sum);
     case Operation::subtract: return binary(" - ", sum);
     case Operation::multiply: return binary(" * ", product);
@@ -216,13 +308,48 @@ std::string StatementPrinter::text(const ShaderNode& node, Precedence outer) con
                                 " : " + text(*node.operands[2], comparison);
       return outer > ternary ? "(" + inner + ")" : inner;
     }
-    case Operation::call: return "Lobefit_" + node.name + "(" + list(node) + ")";
-    case Operation::entry: return "Lobefit_" + node.name + "_entries[int(" + text(*node.operands[0], ternary) + ")]";
-    case Operation::intrinsic:
-      if (node.name == "saturate" && !language_.has_saturate) return "clamp(" + list(node) + ", 0.0, 1.0)";
-      return (node.name == "lerp" ? std::string(language_.lerp) : node.name) + "(" + list(node) + ")";
+    case Operation::call:
+      return "Lobefit_" + (language_.is_c ? own_name(node.name, node.type) : node.name) + "(" + list(node) + ")";
+    case Operation::entry:
+      return "Lobefit_" + node.name + "_entries[" + (language_.is_c ? "(int)(" : "int(") +
+             text(*node.operands[0], ternary) + ")]";
+    case Operation::intrinsic: return intrinsic(node);
   }
   return "";
+}
+
+std::string StatementPrinter::intrinsic(const ShaderNode& node) const {
+  if (node.name == "lerp" && node.type == ShaderType::scalar)
+    return std::string(language_.lerp) + "(" + list(node) + ")";
+  if (!language_.is_c) {
+    if (node.name == "saturate" && !language_.has_saturate) return "clamp(" + list(node) + ", 0.0, 1.0)";
+    return (node.name == "lerp" ? std::string(language_.lerp) : node.name) + "(" + list(node) + ")";
+  }
+  if (node.type == ShaderType::vector || node.name == "dot") return vector_call(node);
+  if (node.name == "saturate") return "fminf(fmaxf(" + list(node) + ", 0.0f), 1.0f)";
+  static const std::set<std::string_view> prefixed{"min", "max", "abs"};
+  return (prefixed.contains(node.name) ? "f" : "") + node.name + "f(" + list(node) + ")";
+}
+
+std::string StatementPrinter::vector_call(const ShaderNode& node) const {
+  static const std::map<Operation, std::string> names{{Operation::add, "add"},
+                                                      {Operation::subtract, "subtract"},
+                                                      {Operation::multiply, "multiply"},
+                                                      {Operation::divide, "divide"}};
+  const auto operation = names.find(node.operation);
+  const std::string name = operation != names.end() ? operation->second : node.name;
+  const auto is_vector = [](const ShaderNode* operand) { return operand->type == ShaderType::vector; };
+  if (node.operation == Operation::multiply && !(is_vector(node.operands[0]) && is_vector(node.operands[1]))) {
+    const std::size_t vector = is_vector(node.operands[0]) ? 0 : 1;
+    return "Lobefit_scale3(" + text(*node.operands[vector], ternary) + ", " +
+           text(*node.operands[1 - vector], ternary) + ")";
+  }
+  std::string joined;
+  for (const ShaderNode* operand : node.operands) {
+    const std::string own = text(*operand, ternary);
+    joined += (joined.empty() ? "" : ", ") + (is_vector(operand) ? own : "Lobefit_splat3(" + own + ")");
+  }
+  return "Lobefit_" + name + "3(" + joined + ")";
 }
 
 std::string StatementPrinter::list(const ShaderNode& node) const {

@@ -14,20 +14,27 @@ namespace lobefit {
 
 struct ShaderLanguage {
   std::string_view name;
-  std::string_view vector;  // type of three floats
+  std::string_view vector;       // type of three floats
+  std::string_view constructor;  // makes one from three
   std::string_view lerp;
   bool has_saturate;
   bool has_initializer_lists;
+  /// C99: no operators on vectors, functions of floats have names of their own, and headers define nothing twice.
+  bool is_c = false;
 };
 
 /// Throws Error(usage) for an unknown name.
 const ShaderLanguage& find_shader_language(std::string_view name);
 
 /// Shortest decimal that reads back as the same float.
-std::string literal_text(double value);
+std::string literal_text(const ShaderLanguage& language, double value);
 
-/// The constants and guards before everything else.
-std::string shader_prologue();
+/// The constants and guards before everything else; in C also the vector and its operations.
+std::string shader_prologue(const ShaderLanguage& language);
+
+/// Head of a function's definition up to its opening brace; `arguments` as they stand in the text.
+std::string function_head(const ShaderLanguage& language, std::string_view result, const std::string& name,
+                          const std::string& arguments);
 
 /// A struct of the parameters; once where several texts are joined.
 std::string struct_text(const ShaderLanguage& language, const std::string& name,
@@ -43,7 +50,7 @@ std::string definitions_text(const ShaderLanguage& language, const Shader& shade
 /// Prints the statements that compute some nodes, each value once.
 class StatementPrinter {
  public:
-  /// `taken`: names that no local may have.
+  /// `taken`: arguments and whatever else no local may be called. In C, compilers are told which of them nothing reads.
   StatementPrinter(const ShaderLanguage& language, std::span<const ShaderNode* const> results,
                    std::span<const std::string> taken);
 
@@ -59,7 +66,10 @@ class StatementPrinter {
   void define(const ShaderNode* node, const std::string& wanted);
   std::string type(ShaderType type) const;
   std::string text(const ShaderNode& node, Precedence outer) const;
+  std::string intrinsic(const ShaderNode& node) const;
   std::string list(const ShaderNode& node) const;
+  /// An operation on vectors as a call, in C.
+  std::string vector_call(const ShaderNode& node) const;
 
   const ShaderLanguage& language_;
   std::map<const ShaderNode*, int> uses_;
@@ -69,7 +79,8 @@ class StatementPrinter {
   int temporaries_ = 0;
 };
 
-/// The statements of a function that returns one value.
-std::string body_text(const ShaderLanguage& language, const ShaderFunction& function);
+/// The statements of a function that returns one value. `taken` are further arguments.
+std::string body_text(const ShaderLanguage& language, const ShaderFunction& function,
+                      std::vector<std::string> taken = {});
 
 }  // namespace lobefit

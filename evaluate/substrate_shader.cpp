@@ -52,8 +52,8 @@ std::string function_text(const ShaderLanguage& language, BlendFunction& functio
     results.push_back(member.node);
   });
   const StatementPrinter printer(language, results, taken);
-  std::string text = "// " + function.comment + "\n" + slab_type + " " + function.name + "(" + arguments + ") {\n    " +
-                     constants_type + " c = " + constants_function + "();\n" + printer.statements() + "    " +
+  std::string text = "// " + function.comment + "\n" + function_head(language, slab_type, function.name, arguments) +
+                     "    " + constants_type + " c = " + constants_function + "();\n" + printer.statements() + "    " +
                      slab_type + " p;\n";
   for (std::size_t i = 0; i < names.size(); ++i) {
     text += "    p." + names[i] + " = " + printer.text(*results[i]) + ";\n";
@@ -109,8 +109,8 @@ std::string blend_shader(std::string_view language_name, const FittedBlend::Cons
   text +=
       "// Slabs that are fully there: partial coverage is a horizontal blend with what lies below.\n"
       "// cos_theta_o: N.V; where no view is known, " +
-      literal_text(FittedBlend::mean_view) + ".\n\n";
-  text += shader_prologue() + struct_text(language, slab_type, members) +
+      number_text(FittedBlend::mean_view) + ".\n\n";
+  text += shader_prologue(language) + struct_text(language, slab_type, members) +
           struct_text(language, constants_type, values) + definitions_text(language, shader) +
           values_text(language, constants_type, constants_function, values);
   for (BlendFunction& function : functions) text += "\n" + function_text(language, function);

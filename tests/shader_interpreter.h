@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -59,6 +60,31 @@ inline ShaderValue run_intrinsic(std::string_view name, const std::vector<Shader
   if (name == "normalize")
     return by_component(x.at(0), {std::sqrt(dot(x.at(0), x.at(0)))}, [](double a, double b) { return a / b; });
   throw std::runtime_error("no intrinsic " + std::string(name));
+}
+
+/// What C texts call the intrinsics and the operations on vectors; none for another name.
+inline std::optional<ShaderValue> run_c_function(std::string_view name, const std::vector<ShaderValue>& x) {
+  if (name.starts_with("Lobefit_") && (name.ends_with("3") || name == "Lobefit_lerp")) {
+    name.remove_prefix(8);
+    if (name.ends_with("3")) name.remove_suffix(1);
+    if (name == "make") return ShaderValue{x.at(0).at(0), x.at(1).at(0), x.at(2).at(0)};
+    if (name == "splat") return ShaderValue{x.at(0).at(0), x.at(0).at(0), x.at(0).at(0)};
+    if (name == "add") return by_component(x.at(0), x.at(1), [](double a, double b) { return a + b; });
+    if (name == "subtract") return by_component(x.at(0), x.at(1), [](double a, double b) { return a - b; });
+    if (name == "multiply" || name == "scale")
+      return by_component(x.at(0), x.at(1), [](double a, double b) { return a * b; });
+    if (name == "divide") return by_component(x.at(0), x.at(1), [](double a, double b) { return a / b; });
+    for (const char* same : {"max", "dot", "normalize", "lerp"}) {
+      if (name == same) return run_intrinsic(name, x);
+    }
+    return {};
+  }
+  static const std::map<std::string_view, std::string_view> floats{
+      {"fminf", "min"}, {"fmaxf", "max"},  {"fabsf", "abs"}, {"floorf", "floor"}, {"sqrtf", "sqrt"},
+      {"expf", "exp"},  {"exp2f", "exp2"}, {"logf", "log"},  {"log2f", "log2"},   {"powf", "pow"}};
+  const auto found = floats.find(name);
+  if (found == floats.end()) return {};
+  return run_intrinsic(found->second, x);
 }
 
 /// Walks a shader's nodes.
@@ -128,7 +154,8 @@ class GraphInterpreter {
   const Shader& shader_;
 };
 
-/// Reads the subset of HLSL and GLSL that lobefit prints, by the grammar of C: ?: comparison sum product unary postfix.
+/// Reads the subset of HLSL, GLSL and C that lobefit prints, by the grammar of C: ?: comparison sum product unary
+/// postfix.
 class TextInterpreter {
  public:
   using Variables = std::map<std::string, ShaderValue>;
@@ -136,12 +163,15 @@ class TextInterpreter {
   explicit TextInterpreter(std::string_view text) {
     split(text);
     while (at_ < tokens_.size()) {
+      const bool named_after = accept("typedef");
       if (accept("struct")) {
         while (!accept("}")) ++at_;
+        if (named_after) ++at_;
         expect(";");
         continue;
       }
       accept("static");
+      accept("inline");
       if (accept("const")) {
         read_table();
         continue;
@@ -151,6 +181,7 @@ class TextInterpreter {
       expect("(");
       while (!accept(")")) {
         accept(",");
+        if (accept("void")) continue;
         ++at_;  // the argument's type
         function.arguments.push_back(next());
       }
@@ -193,7 +224,7 @@ class TextInterpreter {
     ++at_;  // { or (
     do {
       const double sign = accept("-") ? -1.0 : 1.0;
-      entries.push_back(sign * std::stod(next()));
+      entries.push_back(sign * number(next()));
     } while (accept(","));
     ++at_;  // } or )
     expect(";");
@@ -227,6 +258,13 @@ class TextInterpreter {
     }
   }
 
+  static double number(const std::string& token) {
+    std::size_t length = 0;
+    const double value = std::stod(token, &length);
+    if (token.substr(length) != "" && token.substr(length) != "f") throw std::runtime_error("not a number: " + token);
+    return value;
+  }
+
   std::string next() { return tokens_.at(at_++); }
   bool accept(std::string_view token) {
     if (tokens_.at(at_) != token) return false;
@@ -241,6 +279,12 @@ class TextInterpreter {
     const std::size_t caller = at_;
     at_ = function.begin;
     while (!accept("return")) {
+      if (accept("(")) {  // (void)name;
+        for (const char* part : {"void", ")"}) expect(part);
+        ++at_;
+        expect(";");
+        continue;
+      }
       std::string name = next();
       if (accept(".")) {
         name += "." + next();  // p.alpha = …;
@@ -335,14 +379,16 @@ class TextInterpreter {
     }
     const std::string token = next();
     if (std::isdigit(static_cast<unsigned char>(token[0]))) {
-      std::size_t length = 0;
-      const double value = std::stod(token, &length);
-      if (length != token.size()) throw std::runtime_error("not a number: " + token);
-      return {value};
+      return {number(token)};
     }
     if (token == "LOBEFIT_PI") return {pi};
     if (tables_.contains(token)) {
-      for (const char* part : {"[", "int", "("}) expect(part);
+      expect("[");
+      if (accept("(")) {  // (int)(…)
+        for (const char* part : {"int", ")", "("}) expect(part);
+      } else {
+        for (const char* part : {"int", "("}) expect(part);
+      }
       const auto index = static_cast<std::size_t>(ternary(variables).at(0));
       for (const char* part : {")", "]"}) expect(part);
       return {tables_.at(token).at(index)};
@@ -355,6 +401,7 @@ class TextInterpreter {
       }
       if (token == "float3" || token == "vec3")
         return {arguments.at(0).at(0), arguments.at(1).at(0), arguments.at(2).at(0)};
+      if (const auto value = run_c_function(token, arguments)) return *value;
       return functions_.contains(token) ? call(token, arguments) : run_intrinsic(token, arguments);
     }
     if (tokens_.at(at_) == "." && variables.contains(token + "." + tokens_.at(at_ + 1))) {
