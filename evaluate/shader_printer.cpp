@@ -8,10 +8,23 @@ namespace lobefit {
 
 namespace {
 
-constexpr std::array languages{
-    ShaderLanguage{"hlsl", "float3", "float3", "lerp", true, true},
-    ShaderLanguage{"glsl", "vec3", "vec3", "mix", false, false},
-    ShaderLanguage{"c", "Lobefit_float3", "Lobefit_make3", "Lobefit_lerp", false, true, true}};
+constexpr std::array languages{ShaderLanguage{"hlsl", "float3", "float3", "lerp", true, true},
+                               ShaderLanguage{"glsl", "vec3", "vec3", "mix", false, false},
+                               ShaderLanguage{.name = "c",
+                                              .vector = "Lobefit_float3",
+                                              .constructor = "Lobefit_make3",
+                                              .lerp = "Lobefit_lerp",
+                                              .has_saturate = false,
+                                              .has_initializer_lists = true,
+                                              .is_c = true},
+                               ShaderLanguage{.name = "wgsl",
+                                              .vector = "vec3f",
+                                              .constructor = "vec3f",
+                                              .lerp = "mix",
+                                              .has_saturate = true,
+                                              .has_initializer_lists = false,
+                                              .scalar = "f32",
+                                              .is_wgsl = true}};
 
 /// What C lacks. Nothing warns where a text leaves one of them unused.
 constexpr std::string_view c_vectors = R"(#include <math.h>
@@ -76,32 +89,43 @@ std::string upper_case(std::string text) {
 /// also read as C++.
 const std::set<std::string>& reserved_names() {
   static const std::set<std::string> names{
-      "p",       "half",      "double",   "sample",  "smooth",    "flat",     "shared",    "input",   "output",
-      "common",  "partition", "active",   "filter",  "texture",   "point",    "line",      "linear",  "matrix",
-      "vector",  "min",       "max",      "abs",     "floor",     "clamp",    "lerp",      "mix",     "sqrt",
-      "exp",     "exp2",      "log",      "log2",    "pow",       "dot",      "normalize", "cross",   "length",
-      "step",    "fract",     "sign",     "mod",     "out",       "in",       "inout",     "discard", "saturate",
-      "auto",    "break",     "case",     "char",    "const",     "continue", "default",   "delete",  "do",
-      "else",    "enum",      "extern",   "float",   "for",       "goto",     "if",        "inline",  "int",
-      "long",    "new",       "register", "return",  "short",     "signed",   "sizeof",    "static",  "struct",
-      "switch",  "this",      "template", "class",   "typedef",   "union",    "unsigned",  "void",    "volatile",
-      "while",   "and",       "or",       "not",     "xor",       "operator", "private",   "public",  "protected",
-      "virtual", "friend",    "explicit", "using",   "namespace", "try",      "catch",     "throw",   "typename",
-      "bool",    "true",      "false",    "restrict"};
+      "p",       "half",      "double",   "sample", "smooth",    "flat",     "shared",     "input",   "output",
+      "common",  "partition", "active",   "filter", "texture",   "point",    "line",       "linear",  "matrix",
+      "vector",  "min",       "max",      "abs",    "floor",     "clamp",    "lerp",       "mix",     "sqrt",
+      "exp",     "exp2",      "log",      "log2",   "pow",       "dot",      "normalize",  "cross",   "length",
+      "step",    "fract",     "sign",     "mod",    "out",       "in",       "inout",      "discard", "saturate",
+      "auto",    "break",     "case",     "char",   "const",     "continue", "default",    "delete",  "do",
+      "else",    "enum",      "extern",   "float",  "for",       "goto",     "if",         "inline",  "int",
+      "long",    "new",       "register", "return", "short",     "signed",   "sizeof",     "static",  "struct",
+      "switch",  "this",      "template", "class",  "typedef",   "union",    "unsigned",   "void",    "volatile",
+      "while",   "and",       "or",       "not",    "xor",       "operator", "private",    "public",  "protected",
+      "virtual", "friend",    "explicit", "using",  "namespace", "try",      "catch",      "throw",   "typename",
+      "let",     "var",       "fn",       "loop",   "override",  "alias",    "diagnostic", "enable",  "requires",
+      "target",  "final",     "from",     "get",    "set",       "self",     "ref",        "sampler", "type",
+      "use",     "where",     "with",     "select", "array",     "vec3f",    "f32",        "i32",     "bool",
+      "true",    "false",     "restrict"};
   return names;
+}
+
+/// A definition that may be there already: once where texts are joined.
+std::string guarded(const ShaderLanguage& language, const std::string& guard, const std::string& definition) {
+  if (language.is_wgsl) return definition + "\n";
+  return "#ifndef " + guard + "\n#define " + guard + "\n" + definition + "#endif\n\n";
 }
 
 /// A constant array, eight entries a line.
 std::string table_text(const ShaderLanguage& language, const ShaderTable& table) {
-  const std::string guard = "LOBEFIT_TABLE_" + upper_case(table.name);
-  const std::string type = "float[" + std::to_string(table.entries.size()) + "]";
-  std::string text = "#ifndef " + guard + "\n#define " + guard + "\n";
-  text += (language.has_initializer_lists ? "static const float " : "const float ") + ("Lobefit_" + table.name) +
-          "_entries" + type.substr(5) + " = " + (language.has_initializer_lists ? "{" : type + "(");
+  const std::string name = "Lobefit_" + table.name + "_entries", size = std::to_string(table.entries.size());
+  const std::string head = language.is_wgsl ? "const " + name + " = array<f32, " + size + ">("
+                           : language.has_initializer_lists
+                               ? "static const float " + name + "[" + size + "] = {"
+                               : "const float " + name + "[" + size + "] = float[" + size + "](";
+  std::string text = head;
   for (std::size_t i = 0; i < table.entries.size(); ++i) {
     text += (i == 0 ? "" : ",") + std::string(i % 8 == 0 ? "\n    " : " ") + literal_text(language, table.entries[i]);
   }
-  return text + (language.has_initializer_lists ? "\n};\n#endif\n\n" : "\n);\n#endif\n\n");
+  return guarded(language, "LOBEFIT_TABLE_" + upper_case(table.name),
+                 text + (language.has_initializer_lists ? "\n};\n" : "\n);\n"));
 }
 
 bool is_atom(const ShaderNode& node) {
@@ -115,14 +139,16 @@ bool is_atom(const ShaderNode& node) {
 }
 
 std::string value_type(const ShaderLanguage& language, ShaderType type) {
-  return type == ShaderType::vector ? std::string(language.vector) : "float";
+  return std::string(type == ShaderType::vector ? language.vector : language.scalar);
 }
 
 /// A traced function's name behind its prefix. Texts that are joined may hold one function on scalars and on vectors:
-/// these are told apart by their guards, and in C, which does not overload, by their names.
+/// these are told apart by their guards, and in languages that do not overload by their names.
 std::string own_name(const std::string& name, ShaderType result) {
   return result == ShaderType::vector ? name + "3" : name;
 }
+
+bool overloads(const ShaderLanguage& language) { return !language.is_c && !language.is_wgsl; }
 
 }  // namespace
 
@@ -152,35 +178,51 @@ std::string literal_text(const ShaderLanguage& language, double value) {
 }
 
 std::string shader_prologue(const ShaderLanguage& language) {
+  if (language.is_wgsl) return "const LOBEFIT_PI = 3.14159265;\n\n";
   return (language.is_c ? std::string(c_vectors) : "") + "#ifndef LOBEFIT_PI\n#define LOBEFIT_PI 3.14159265" +
          (language.is_c ? "f" : "") + "\n#endif\n\n";
 }
 
+std::string argument_text(const ShaderLanguage& language, std::string_view type, std::string_view name) {
+  return language.is_wgsl ? std::string(name) + ": " + std::string(type) : std::string(type) + " " + std::string(name);
+}
+
+std::string variable_text(const ShaderLanguage& language, std::string_view type, std::string_view name) {
+  return "    " + std::string(language.is_wgsl ? "var " : "") + argument_text(language, type, name) + ";\n";
+}
+
+std::string local_text(const ShaderLanguage& language, std::string_view type, std::string_view name,
+                       std::string_view value) {
+  return "    " + std::string(language.is_wgsl ? "let" : type) + " " + std::string(name) + " = " + std::string(value) +
+         ";\n";
+}
+
 std::string function_head(const ShaderLanguage& language, std::string_view result, const std::string& name,
                           const std::string& arguments) {
+  if (language.is_wgsl) return "fn " + name + "(" + arguments + ") -> " + std::string(result) + " {\n";
   return (language.is_c ? "static inline " : "") + std::string(result) + " " + name + "(" +
          (language.is_c && arguments.empty() ? "void" : arguments) + ") {\n";
 }
 
 std::string struct_text(const ShaderLanguage& language, const std::string& name,
                         std::span<const ShaderParameter> parameters) {
-  const std::string guard = "LOBEFIT_STRUCT_" + upper_case(name);
-  std::string text = "#ifndef " + guard + "\n#define " + guard + "\n" +
-                     (language.is_c ? "typedef struct " : "struct ") + name + " {\n";
+  const std::string_view end = language.is_wgsl ? "," : ";";
+  std::string text = (language.is_c ? "typedef struct " : "struct ") + name + " {\n";
   for (const ShaderParameter& parameter : parameters) {
     const ParameterInfo& info = parameter.info;
-    text += "    " + (info.components == 3 ? std::string(language.vector) : std::string("float")) + " " +
-            std::string(info.name) + ";  // " + std::string(info.doc) + " Range " + number_text(info.lower) + " to " +
+    text += "    " + argument_text(language, info.components == 3 ? language.vector : language.scalar, info.name) +
+            std::string(end) + "  // " + std::string(info.doc) + " Range " + number_text(info.lower) + " to " +
             number_text(info.upper) + (info.unit.empty() ? "" : " " + std::string(info.unit)) + ".\n";
   }
   // GLSL has no empty structs.
-  if (parameters.empty()) text += "    float unused;\n";
-  return text + (language.is_c ? "} " + name : "}") + ";\n#endif\n\n";
+  if (parameters.empty()) text += "    " + argument_text(language, language.scalar, "unused") + std::string(end) + "\n";
+  return guarded(language, "LOBEFIT_STRUCT_" + upper_case(name),
+                 text + (language.is_c ? "} " + name : "}") + (language.is_wgsl ? "\n" : ";\n"));
 }
 
 std::string values_text(const ShaderLanguage& language, const std::string& type, const std::string& function,
                         std::span<const ShaderParameter> parameters) {
-  std::string text = function_head(language, type, function, "") + "    " + type + " p;\n";
+  std::string text = function_head(language, type, function, "") + variable_text(language, type, "p");
   for (const ShaderParameter& parameter : parameters) {
     std::string value;
     for (const double component : parameter.value)
@@ -197,16 +239,16 @@ std::string definitions_text(const ShaderLanguage& language, const Shader& shade
   std::string text;
   for (const ShaderTable& table : shader.tables) text += table_text(language, table);
   for (const ShaderFunction& function : shader.functions) {
-    const std::string guard = "LOBEFIT_FUNCTION_" + upper_case(own_name(function.name, function.result->type));
+    const std::string own = own_name(function.name, function.result->type);
     std::string arguments;
     for (const ShaderArgument& argument : function.arguments) {
-      arguments += (arguments.empty() ? "" : ", ") + value_type(language, argument.type) + " " + argument.name;
+      arguments +=
+          (arguments.empty() ? "" : ", ") + argument_text(language, value_type(language, argument.type), argument.name);
     }
-    text += "#ifndef " + guard + "\n#define " + guard + "\n" +
-            function_head(language, value_type(language, function.result->type),
-                          "Lobefit_" + (language.is_c ? own_name(function.name, function.result->type) : function.name),
-                          arguments) +
-            body_text(language, function) + "}\n#endif\n\n";
+    text += guarded(language, "LOBEFIT_FUNCTION_" + upper_case(own),
+                    function_head(language, value_type(language, function.result->type),
+                                  "Lobefit_" + (overloads(language) ? function.name : own), arguments) +
+                        body_text(language, function) + "}\n");
   }
   return text;
 }
@@ -260,14 +302,14 @@ void StatementPrinter::collect(const ShaderNode* node, std::vector<const ShaderN
 void StatementPrinter::define(const ShaderNode* node, const std::string& wanted) {
   std::string name = wanted;
   for (int i = 2; !taken_.insert(name).second; ++i) name = wanted + "_" + std::to_string(i);
-  statements_ += "    " + type(node->type) + " " + name + " = " + text(*node, ternary) + ";\n";
+  statements_ += local_text(language_, type(node->type), name, text(*node, ternary));
   names_.emplace(node, name);
 }
 
 std::string StatementPrinter::type(ShaderType type) const {
   switch (type) {
     case ShaderType::boolean: return "bool";
-    case ShaderType::scalar: return "float";
+    case ShaderType::scalar: return std::string(language_.scalar);
     case ShaderType::vector: return std::string(language_.vector);
   }
   return "";
@@ -304,14 +346,21 @@ std::string StatementPrinter::text(const ShaderNode& node, Precedence outer) con
       return outer > sum ? "(" + inner + ")" : inner;
     }
     case Operation::select: {
+      if (language_.is_wgsl) {
+        return "select(" + text(*node.operands[2], ternary) + ", " + text(*node.operands[1], ternary) + ", " +
+               text(*node.operands[0], ternary) + ")";
+      }
       const std::string inner = text(*node.operands[0], comparison) + " ? " + text(*node.operands[1], comparison) +
                                 " : " + text(*node.operands[2], comparison);
       return outer > ternary ? "(" + inner + ")" : inner;
     }
     case Operation::call:
-      return "Lobefit_" + (language_.is_c ? own_name(node.name, node.type) : node.name) + "(" + list(node) + ")";
+      return "Lobefit_" + (overloads(language_) ? node.name : own_name(node.name, node.type)) + "(" + list(node) + ")";
     case Operation::entry:
-      return "Lobefit_" + node.name + "_entries[" + (language_.is_c ? "(int)(" : "int(") +
+      return "Lobefit_" + node.name + "_entries[" +
+             (language_.is_c      ? "(int)("
+              : language_.is_wgsl ? "i32("
+                                  : "int(") +
              text(*node.operands[0], ternary) + ")]";
     case Operation::intrinsic: return intrinsic(node);
   }
@@ -323,7 +372,10 @@ std::string StatementPrinter::intrinsic(const ShaderNode& node) const {
     return std::string(language_.lerp) + "(" + list(node) + ")";
   if (!language_.is_c) {
     if (node.name == "saturate" && !language_.has_saturate) return "clamp(" + list(node) + ", 0.0, 1.0)";
-    return (node.name == "lerp" ? std::string(language_.lerp) : node.name) + "(" + list(node) + ")";
+    // WGSL's functions take operands of one type; mix() also a vector pair and a scalar.
+    const bool splats = language_.is_wgsl && node.type == ShaderType::vector;
+    return (node.name == "lerp" ? std::string(language_.lerp) : node.name) + "(" +
+           (splats ? list(node, std::string(language_.vector)) : list(node)) + ")";
   }
   if (node.type == ShaderType::vector || node.name == "dot") return vector_call(node);
   if (node.name == "saturate") return "fminf(fmaxf(" + list(node) + ", 0.0f), 1.0f)";
@@ -344,17 +396,16 @@ std::string StatementPrinter::vector_call(const ShaderNode& node) const {
     return "Lobefit_scale3(" + text(*node.operands[vector], ternary) + ", " +
            text(*node.operands[1 - vector], ternary) + ")";
   }
+  return "Lobefit_" + name + "3(" + list(node, "Lobefit_splat3") + ")";
+}
+
+std::string StatementPrinter::list(const ShaderNode& node, const std::string& splat) const {
   std::string joined;
   for (const ShaderNode* operand : node.operands) {
     const std::string own = text(*operand, ternary);
-    joined += (joined.empty() ? "" : ", ") + (is_vector(operand) ? own : "Lobefit_splat3(" + own + ")");
+    const bool as_it_is = splat.empty() || operand->type == ShaderType::vector;
+    joined += (joined.empty() ? "" : ", ") + (as_it_is ? own : splat + "(" + own + ")");
   }
-  return "Lobefit_" + name + "3(" + joined + ")";
-}
-
-std::string StatementPrinter::list(const ShaderNode& node) const {
-  std::string joined;
-  for (const ShaderNode* operand : node.operands) joined += (joined.empty() ? "" : ", ") + text(*operand, ternary);
   return joined;
 }
 

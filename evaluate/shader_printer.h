@@ -19,8 +19,11 @@ struct ShaderLanguage {
   std::string_view lerp;
   bool has_saturate;
   bool has_initializer_lists;
+  std::string_view scalar = "float";
   /// C99: no operators on vectors, functions of floats have names of their own, and headers define nothing twice.
   bool is_c = false;
+  /// Types stand behind names, selections are functions, and there is no preprocessor to guard what is there already.
+  bool is_wgsl = false;
 };
 
 /// Throws Error(usage) for an unknown name.
@@ -32,7 +35,17 @@ std::string literal_text(const ShaderLanguage& language, double value);
 /// The constants and guards before everything else; in C also the vector and its operations.
 std::string shader_prologue(const ShaderLanguage& language);
 
-/// Head of a function's definition up to its opening brace; `arguments` as they stand in the text.
+/// `type name`, as an argument stands in a text.
+std::string argument_text(const ShaderLanguage& language, std::string_view type, std::string_view name);
+
+/// A local that is assigned later.
+std::string variable_text(const ShaderLanguage& language, std::string_view type, std::string_view name);
+
+/// A local that keeps its value.
+std::string local_text(const ShaderLanguage& language, std::string_view type, std::string_view name,
+                       std::string_view value);
+
+/// Head of a function's definition up to its opening brace.
 std::string function_head(const ShaderLanguage& language, std::string_view result, const std::string& name,
                           const std::string& arguments);
 
@@ -67,7 +80,8 @@ class StatementPrinter {
   std::string type(ShaderType type) const;
   std::string text(const ShaderNode& node, Precedence outer) const;
   std::string intrinsic(const ShaderNode& node) const;
-  std::string list(const ShaderNode& node) const;
+  /// The operands; scalars as vectors by the function `splat`, if there is one.
+  std::string list(const ShaderNode& node, const std::string& splat = "") const;
   /// An operation on vectors as a call, in C.
   std::string vector_call(const ShaderNode& node) const;
 

@@ -39,11 +39,11 @@ std::string function_text(const ShaderLanguage& language, BlendFunction& functio
   std::string arguments;
   std::vector<std::string> taken{"c"};
   const auto add = [&](const std::string& type, const std::string& name) {
-    arguments += (arguments.empty() ? "" : ", ") + type + " " + name;
+    arguments += (arguments.empty() ? "" : ", ") + argument_text(language, type, name);
     taken.push_back(name);
   };
   for (const std::string& slab : function.slabs) add(slab_type, slab);
-  for (const std::string& number : function.numbers) add("float", number);
+  for (const std::string& number : function.numbers) add(std::string(language.scalar), number);
 
   std::vector<std::string> names;
   std::vector<const ShaderNode*> results;
@@ -53,8 +53,8 @@ std::string function_text(const ShaderLanguage& language, BlendFunction& functio
   });
   const StatementPrinter printer(language, results, taken);
   std::string text = "// " + function.comment + "\n" + function_head(language, slab_type, function.name, arguments) +
-                     "    " + constants_type + " c = " + constants_function + "();\n" + printer.statements() + "    " +
-                     slab_type + " p;\n";
+                     local_text(language, constants_type, "c", constants_function + "()") + printer.statements() +
+                     variable_text(language, slab_type, "p");
   for (std::size_t i = 0; i < names.size(); ++i) {
     text += "    p." + names[i] + " = " + printer.text(*results[i]) + ";\n";
   }

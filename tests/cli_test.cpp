@@ -467,7 +467,9 @@ TEST_F(CommandLine, FitCheckExportHangTogether) {
             std::string::npos);
   EXPECT_NE(shader.out.find("Lobefit_proxima_Fitted()"), std::string::npos);
   EXPECT_NE(shader.out.find("p.b = 0.11"), std::string::npos) << shader.out;
-  expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl"});
+  EXPECT_NE(run("export fit.json --lang c").out.find("    p.b = 0.11"), std::string::npos);
+  EXPECT_NE(run("export fit.json --lang wgsl").out.find("fn Lobefit_proxima_Fitted() -> "), std::string::npos);
+  expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl", "wgsl"});
   expect_refused("check fit.json --device vulkan", 6, {"Vulkan"});
 }
 

@@ -1,4 +1,5 @@
-// What judges shader texts: glslangValidator, and for C the compilers of C and C++ with their warnings.
+// What judges shader texts: glslangValidator, for C the compilers of C and C++ with their warnings, for WGSL tint or
+// naga (neither is in Debian 12).
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,14 +14,16 @@
 namespace lobefit {
 
 inline bool has_shader_compiler(std::string_view language) {
-  return std::system(language == "c" ? "command -v cc > /dev/null" : "command -v glslangValidator > /dev/null") == 0;
+  return std::system(language == "c"      ? "command -v cc > /dev/null"
+                     : language == "wgsl" ? "command -v tint > /dev/null || command -v naga > /dev/null"
+                                          : "command -v glslangValidator > /dev/null") == 0;
 }
 
 /// A vector of three literals, such as "0.6".
 inline std::string vector_text(std::string_view language, const std::string& x, const std::string& y,
                                const std::string& z) {
   if (language == "c") return "Lobefit_make3(" + x + "f, " + y + "f, " + z + "f)";
-  return (language == "glsl" ? "vec3(" : "float3(") + x + ", " + y + ", " + z + ")";
+  return (language == "glsl" ? "vec3(" : language == "wgsl" ? "vec3f(" : "float3(") + x + ", " + y + ", " + z + ")";
 }
 
 /// Runs a command; what it printed where it failed, or "".
@@ -50,11 +53,23 @@ inline std::string c_complaint(const std::string& text, const std::string& expre
   return complaint.empty() ? "" : complaint + source;
 }
 
-/// Compiles a compute shader that stores `expression`, of three components, after `text`; or what c_complaint()
-/// compiles. Returns the compiler's complaint with the source, or "". `name` tells the temporary files of tests apart.
+/// Validates a function that returns `expression` after `text`.
+inline std::string wgsl_complaint(const std::string& text, const std::string& expression, const std::string& name) {
+  const std::string stem = ::testing::TempDir() + "lobefit_" + name;
+  const std::string source = text + "\nfn result() -> vec3f { return " + expression + "; }\n";
+  std::ofstream(stem + ".wgsl") << source;
+  const std::string complaint = command_complaint("$(command -v tint || command -v naga) '" + stem + ".wgsl'", stem);
+  std::remove((stem + ".wgsl").c_str());
+  return complaint.empty() ? "" : complaint + source;
+}
+
+/// Compiles a compute shader that stores `expression`, of three components, after `text`; or what c_complaint() or
+/// wgsl_complaint() take. Returns the compiler's complaint with the source, or "". `name` tells the temporary files of
+/// tests apart.
 inline std::string shader_complaint(std::string_view language, const std::string& text, const std::string& expression,
                                     const std::string& name) {
   if (language == "c") return c_complaint(text, expression, name);
+  if (language == "wgsl") return wgsl_complaint(text, expression, name);
   const bool is_glsl = language == "glsl";
   const std::string source =
       is_glsl ? "#version 450\nlayout(local_size_x = 1) in;\nlayout(std430, binding = 0) buffer Result { vec4 result; "

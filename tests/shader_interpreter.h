@@ -154,7 +154,7 @@ class GraphInterpreter {
   const Shader& shader_;
 };
 
-/// Reads the subset of HLSL, GLSL and C that lobefit prints, by the grammar of C: ?: comparison sum product unary
+/// Reads the subset of HLSL, GLSL, C and WGSL that lobefit prints, by the grammar of C: ?: comparison sum product unary
 /// postfix.
 class TextInterpreter {
  public:
@@ -167,7 +167,7 @@ class TextInterpreter {
       if (accept("struct")) {
         while (!accept("}")) ++at_;
         if (named_after) ++at_;
-        expect(";");
+        if (at_ < tokens_.size()) accept(";");
         continue;
       }
       accept("static");
@@ -176,16 +176,17 @@ class TextInterpreter {
         read_table();
         continue;
       }
-      ++at_;  // the result's type
+      ++at_;  // the result's type, or fn
       Function& function = functions_[next()];
       expect("(");
       while (!accept(")")) {
         accept(",");
         if (accept("void")) continue;
-        ++at_;  // the argument's type
-        function.arguments.push_back(next());
+        const std::string first = next();  // the argument's type, or its name
+        function.arguments.push_back(accept(":") ? first : tokens_.at(at_));
+        ++at_;
       }
-      expect("{");
+      while (!accept("{")) ++at_;
       function.begin = at_;
       while (!accept("}")) ++at_;
     }
@@ -212,16 +213,30 @@ class TextInterpreter {
     std::size_t begin = 0;
   };
 
-  /// float name[size] = {…}; or = float[size](…);
+  /// float name[size] = {…}; or = float[size](…); or WGSL's name = array<f32, size>(…);
   void read_table() {
-    expect("float");
+    if (!accept("float")) {
+      const std::string name = next();
+      expect("=");
+      if (!accept("array")) {  // a number, which primary() knows
+        while (!accept(";")) ++at_;
+        return;
+      }
+      for (const char* part : {"<", "f32", ","}) expect(part);
+      read_entries(tables_[name], std::stoul(next()), 2);
+      return;
+    }
     ShaderValue& entries = tables_[next()];
     expect("[");
     const std::size_t size = std::stoul(next());
     expect("]");
     expect("=");
     if (accept("float")) at_ += 3;
-    ++at_;  // { or (
+    read_entries(entries, size, 1);
+  }
+
+  void read_entries(ShaderValue& entries, std::size_t size, std::size_t before) {
+    at_ += before;  // { or ( or >(
     do {
       const double sign = accept("-") ? -1.0 : 1.0;
       entries.push_back(sign * number(next()));
@@ -291,6 +306,7 @@ class TextInterpreter {
       } else {
         name = next();  // type name = …; or type name;
         if (variables.contains(name)) throw std::runtime_error(name + " is defined twice");
+        if (accept(":")) ++at_;  // var name: type;
         if (accept(";")) continue;
       }
       expect("=");
@@ -387,7 +403,8 @@ class TextInterpreter {
       if (accept("(")) {  // (int)(…)
         for (const char* part : {"int", ")", "("}) expect(part);
       } else {
-        for (const char* part : {"int", "("}) expect(part);
+        if (!accept("i32")) expect("int");
+        expect("(");
       }
       const auto index = static_cast<std::size_t>(ternary(variables).at(0));
       for (const char* part : {")", "]"}) expect(part);
@@ -399,7 +416,9 @@ class TextInterpreter {
         accept(",");
         arguments.push_back(ternary(variables));
       }
-      if (token == "float3" || token == "vec3")
+      if (token == "select") return arguments.at(2).at(0) != 0.0 ? arguments[1] : arguments[0];
+      if (token == "vec3f" && arguments.size() == 1) return ShaderValue(3, arguments[0].at(0));
+      if (token == "float3" || token == "vec3" || token == "vec3f")
         return {arguments.at(0).at(0), arguments.at(1).at(0), arguments.at(2).at(0)};
       if (const auto value = run_c_function(token, arguments)) return *value;
       return functions_.contains(token) ? call(token, arguments) : run_intrinsic(token, arguments);
