@@ -1137,8 +1137,8 @@ TEST_F(Formats, PublishedFitsScoreAsPublished) {
   EXPECT_NEAR(median(abc_scores), 0.00724, 0.02 * 0.00724);
   // .0127 is the data's README. This formula and these numbers are also dj_brdf's and BBM's, and give .0121: the middle
   // of the 50th and 51st material at .0118 and .0124, the 53rd being at .0127. No digit of it hangs on G, on K, on
-  // float, on cuts of F, G or f at 0 or 1, or on bins without a value. Of forty other readings of the formula and the
-  // metric one comes within 2 %, F1 cos² in the place of F1 cos, which no source has.
+  // float, on cuts of F, G or f at 0 or 1, or on bins without a value. Of some forty other readings of the formula and
+  // the metric one comes within 2 %, F1 cos² in the place of F1 cos, which no source has.
   EXPECT_NEAR(median(sgd_scores), 0.0127, 0.06 * 0.0127);
 }
 
