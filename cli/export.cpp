@@ -16,6 +16,7 @@ void add_export(CLI::App& app, Context& context) {
                          "Shader code of a model, with its constants and where they came from\n"
                          "  lobefit export fit.json --lang hlsl -o proxima.ush\n"
                          "  lobefit export eon --lang glsl --set roughness=0.3\n"
+                         "  lobefit export fit.json --lang c -o proxima.h        C99, or C++: static inline functions\n"
                          "  lobefit export fit.json --gbuffer --table truth.exr\n"
                          "--gbuffer tells, of Callisto, what its port to Unreal Engine 4.27 keeps: bytes and "
                          "loss of each parameter, and the\n"

@@ -369,7 +369,8 @@ void add_shader(CLI::App& slab, Context& context) {
       "shader",
       "Shader code of the rules that make one slab of two\n"
       "Lobefit_BlendVertical, Lobefit_BlendHorizontal and the same with Haze, on the parameter struct of\n"
-      "`lobefit export slab`; both texts may stand in one shader.");
+      "`lobefit export slab`; both texts may stand in one shader (in WGSL what both define is to be taken out of "
+      "one).");
   struct Arguments {
     std::string language = "hlsl", rules, output;
   };

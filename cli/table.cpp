@@ -17,7 +17,7 @@ namespace {
 
 /// A file to read, with what only some formats need.
 struct FileArguments {
-  std::string name, material, utia = "raw";
+  std::string name, material, utia = "raw", wo, wi;
 
   void add_to(CLI::App& verb) {
     verb.add_option("FILE", name, "Table or measured file, known by its bytes")->required();
@@ -26,9 +26,18 @@ struct FileArguments {
                     "UTIA files only, whose scale readers dispute: raw, or srgb (/140, decoded, times 100)")
         ->check(CLI::IsMember({"raw", "srgb"}))
         ->capture_default_str();
+    CLI::Option* view = verb.add_option("--wo", wo, "Lat-long pictures over the light: the view THETA,PHI in degrees");
+    verb.add_option("--wi", wi, "Lat-long pictures over the view: the light THETA,PHI in degrees")->excludes(view);
   }
   ReadOptions read_options() const {
-    return {.material = material, .utia_scale = utia == "raw" ? Utia::Scale::raw : Utia::Scale::srgb};
+    ReadOptions options{.material = material, .utia_scale = utia == "raw" ? Utia::Scale::raw : Utia::Scale::srgb};
+    const std::string& text = wo.empty() ? wi : wo;
+    if (text.empty()) return options;
+    const char* option = wo.empty() ? "--wi" : "--wo";
+    parse_direction(text, option);  // its range
+    const std::vector<double> angles = parse_numbers(text, option);
+    options.held = {wo.empty() ? FixedDirection::light : FixedDirection::view, angles[0], angles[1]};
+    return options;
   }
 };
 
@@ -106,6 +115,11 @@ void add_convert(CLI::App& tables, Context& context) {
       "  lobefit table convert aurora_white_rgb.bsdf -o aurora_white.binary      RGL to MERL\n"
       "  lobefit table convert merl_nbrdf.txt --material brass -o brass.binary   network weights to a MERL table\n"
       "  lobefit table convert brass.binary --grid default -o brass.exr          onto a grid of angles\n"
+      "  lobefit table convert lobe30.exr --wo 30,0 -o lobe30_table.exr          a lat-long picture of a BRDF\n"
+      "Lat-long pictures: f in 1/sr without cosine over the light's directions for one view (or the reverse, --wi);\n"
+      "2:1 the whole sphere, 4:1 the upper hemisphere, the normal at the top, azimuth 0 at the left edge and growing\n"
+      "to the right, angles at the centres of pixels. Attributes theta_o, phi_o (or theta_i, phi_i) of the file name\n"
+      "the direction that it holds. `lobefit table merge` joins the tables of several views.\n"
       "Files keep their own grid where the format written has one for it. A MERL bin holds the mean of both orders\n"
       "of its directions; values below 0 become 0 there, and what has no value -1.");
   struct Arguments {
@@ -142,26 +156,42 @@ void add_convert(CLI::App& tables, Context& context) {
   });
 }
 
+Table merged(const std::vector<std::filesystem::path>& paths, bool partial, const Context& context) {
+  Table first = read_table(paths.front());
+  if (first.shards.count > 1) return merge_shards(paths, partial);
+  if (partial) throw Error(ExitCode::usage, "whole tables leave no shards out", "--partial", "leave it out");
+  std::vector<Table> tables{std::move(first)};
+  for (std::size_t k = 1; k < paths.size(); ++k) tables.push_back(read_table(paths[k]));
+  Table joined = join_polar_angles(tables, paths);
+  joined.command = context.command;
+  if (joined.version.empty()) joined.version = LOBEFIT_VERSION;
+  return joined;
+}
+
 void add_merge(CLI::App& tables, Context& context) {
   CLI::App* verb = tables.add_subcommand("merge",
                                          "Joins the shards of one render into the table that one run would have made\n"
                                          "  for i in 1 2 3; do\n"
                                          "    lobefit render microfacet_diffuse --shard $i/3 -o part$i.exr\n"
                                          "  done\n"
-                                         "  lobefit table merge part1.exr part2.exr part3.exr -o truth.exr");
+                                         "  lobefit table merge part1.exr part2.exr part3.exr -o truth.exr\n"
+                                         "or whole tables that differ in theta_o (or theta_i) alone, as lat-long\n"
+                                         "pictures for several views do\n"
+                                         "  lobefit table merge lobe00.exr lobe30.exr lobe60.exr -o lobes.exr");
   struct Arguments {
     std::vector<std::string> names;
     std::string output;
     bool partial = false;
   };
   const auto a = std::make_shared<Arguments>();
-  verb->add_option("SHARDS", a->names, "Tables that `lobefit render --shard` wrote")->required();
+  verb->add_option("SHARDS", a->names, "Tables that `lobefit render --shard` wrote, or of single polar angles")
+      ->required();
   verb->add_option("-o,--output", a->output, "Table to write (.exr)")->required();
   verb->add_flag("--partial", a->partial, "Mask the lines of missing shards; the result can be merged further");
   verb->callback([&context, a] {
     OutputFile file(a->output, context.force);
     const std::vector<std::filesystem::path> paths(a->names.begin(), a->names.end());
-    const Table table = merge_shards(paths, a->partial);
+    const Table table = merged(paths, a->partial, context);
     table.write(file.temporary());
     file.commit();
     if (table.shards.count > 1)

@@ -65,10 +65,11 @@ std::string form_shader(std::string_view form, std::string_view language_name, s
     for (const std::string& line : provenance) text += "// " + line + "\n";
     std::string arguments;
     for (const std::string_view argument : F::arguments) {
-      arguments += (arguments.empty() ? "float " : ", float ") + std::string(argument);
+      arguments += (arguments.empty() ? "" : ", ") + argument_text(language, language.scalar, argument);
     }
-    text += "\n" + shader_prologue() + definitions_text(language, shader) + "float Lobefit_" + std::string(F::name) +
-            "(" + arguments + ") {\n" + body_text(language, shader.brdf) + "}\n";
+    text += "\n" + shader_prologue(language) + definitions_text(language, shader) +
+            function_head(language, language.scalar, "Lobefit_" + std::string(F::name), arguments) +
+            body_text(language, shader.brdf) + "}\n";
   });
   return text;
 }

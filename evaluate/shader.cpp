@@ -21,10 +21,12 @@ std::string print_shader(const Shader& shader, std::string_view language_name, c
   text += "// wi: to the light, wo: to the viewer; unit vectors of the tangent frame, z " + std::string(axis) +
           ".\n// Returns " + std::string(result) + "." +
           (model.transmits ? "\n// Multiply it by |N.L|: light from behind comes through." : "") + "\n\n" +
-          shader_prologue() + struct_text(language, name + "_Parameters", parameters) +
+          shader_prologue(language) + struct_text(language, name + "_Parameters", parameters) +
           definitions_text(language, shader);
-  text += vector + " " + name + "(" + vector + " wi, " + vector + " wo, " + name + "_Parameters p) {\n" +
-          body_text(language, shader.brdf) + "}\n\n";
+  text += function_head(language, vector, name,
+                        argument_text(language, vector, "wi") + ", " + argument_text(language, vector, "wo") + ", " +
+                            argument_text(language, name + "_Parameters", "p")) +
+          body_text(language, shader.brdf, {"p"}) + "}\n\n";
 
   return text + values_text(language, name + "_Parameters", name + "_Fitted", parameters);
 }

@@ -11,7 +11,9 @@
 
 namespace lobefit {
 
-/// Languages that print_shader() writes: "hlsl" (Shader Model 5 style), "glsl" (4.50).
+/// Languages that print_shader() writes: "hlsl" (Shader Model 5 style), "glsl" (4.50), "c" (C99,
+/// which C++ reads too), "wgsl". Texts of several models may be joined into one, but in C not that of a term with those
+/// of the models that call it, and in WGSL, which has no preprocessor, none.
 std::vector<std::string> shader_languages();
 
 /// One parameter's value in the printed Fitted() function.

@@ -39,11 +39,11 @@ std::string function_text(const ShaderLanguage& language, BlendFunction& functio
   std::string arguments;
   std::vector<std::string> taken{"c"};
   const auto add = [&](const std::string& type, const std::string& name) {
-    arguments += (arguments.empty() ? "" : ", ") + type + " " + name;
+    arguments += (arguments.empty() ? "" : ", ") + argument_text(language, type, name);
     taken.push_back(name);
   };
   for (const std::string& slab : function.slabs) add(slab_type, slab);
-  for (const std::string& number : function.numbers) add("float", number);
+  for (const std::string& number : function.numbers) add(std::string(language.scalar), number);
 
   std::vector<std::string> names;
   std::vector<const ShaderNode*> results;
@@ -52,9 +52,9 @@ std::string function_text(const ShaderLanguage& language, BlendFunction& functio
     results.push_back(member.node);
   });
   const StatementPrinter printer(language, results, taken);
-  std::string text = "// " + function.comment + "\n" + slab_type + " " + function.name + "(" + arguments + ") {\n    " +
-                     constants_type + " c = " + constants_function + "();\n" + printer.statements() + "    " +
-                     slab_type + " p;\n";
+  std::string text = "// " + function.comment + "\n" + function_head(language, slab_type, function.name, arguments) +
+                     local_text(language, constants_type, "c", constants_function + "()") + printer.statements() +
+                     variable_text(language, slab_type, "p");
   for (std::size_t i = 0; i < names.size(); ++i) {
     text += "    p." + names[i] + " = " + printer.text(*results[i]) + ";\n";
   }
@@ -109,8 +109,8 @@ std::string blend_shader(std::string_view language_name, const FittedBlend::Cons
   text +=
       "// Slabs that are fully there: partial coverage is a horizontal blend with what lies below.\n"
       "// cos_theta_o: N.V; where no view is known, " +
-      literal_text(FittedBlend::mean_view) + ".\n\n";
-  text += shader_prologue() + struct_text(language, slab_type, members) +
+      number_text(FittedBlend::mean_view) + ".\n\n";
+  text += shader_prologue(language) + struct_text(language, slab_type, members) +
           struct_text(language, constants_type, values) + definitions_text(language, shader) +
           values_text(language, constants_type, constants_function, values);
   for (BlendFunction& function : functions) text += "\n" + function_text(language, function);

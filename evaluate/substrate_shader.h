@@ -10,7 +10,7 @@
 namespace lobefit {
 
 /// FittedBlend with its constants in one struct, as functions on the parameter struct of the exported model `slab`;
-/// both texts may stand in one shader:
+/// both texts may stand in one shader (in WGSL what both define is to be taken out of one):
 ///
 ///   Lobefit_slab_Parameters Lobefit_BlendVertical(top, bottom, cos_theta_o)
 ///   Lobefit_slab_Parameters Lobefit_BlendHorizontal(background, foreground, foreground_share, cos_theta_o)

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "models/error.h"
+#include "models/parameter.h"
 
 namespace lobefit {
 
@@ -92,6 +93,66 @@ Table merge_shards(std::span<const std::filesystem::path> files, bool partial) {
                   "table merge", "render them, or mask their lines with --partial");
   }
   return merged;
+}
+
+Table join_polar_angles(std::span<const Table> tables, std::span<const std::filesystem::path> names) {
+  if (tables.empty()) throw Error(ExitCode::usage, "no tables", "table merge", "name the files to join");
+  const Table& first = tables.front();
+  const bool views = tables.size() < 2 || first.grid.theta_i.values == tables[1].grid.theta_i.values;
+  const auto axis = [&](const Table& table) -> const Axis& { return views ? table.grid.theta_o : table.grid.theta_i; };
+  const auto rest = [&](const Table& table) {
+    Json fingerprint = table.fingerprint();
+    fingerprint["axes"].erase(axis(table).name);
+    return fingerprint;
+  };
+  Axis joined = axis(first);
+  joined.values.clear();
+  for (std::size_t t = 0; t < tables.size(); ++t) {
+    const Table& table = tables[t];
+    if (table.coordinates != Coordinates::spherical || table.shards.count > 1) {
+      throw refused("not a whole table over polar angles and azimuths", names[t],
+                    "shards and measured grids are no slices at single angles");
+    }
+    const Json there = rest(first), here = rest(table);
+    if (there != here || axis(table).midpoints != joined.midpoints) {
+      throw refused("differs from " + names[0].string() + " in more than one polar angle: " + differences(there, here),
+                    names[t], "give tables over the same other axes");
+    }
+    joined.values.insert(joined.values.end(), axis(table).values.begin(), axis(table).values.end());
+  }
+  std::sort(joined.values.begin(), joined.values.end());
+  const auto twice = std::adjacent_find(joined.values.begin(), joined.values.end());
+  if (twice != joined.values.end()) {
+    throw refused(joined.name + " = " + number_text(*twice) + " comes twice", "table merge", "give every angle once");
+  }
+  Table result = first;
+  (views ? result.grid.theta_o : result.grid.theta_i) = joined;
+  result.allocate();
+  result.replicates.resize(first.replicates.empty() ? 0 : result.values.size() * replicate_count);
+  result.order_replicates.resize(first.order_replicates.empty() ? 0 : result.order_values.size() * replicate_count);
+  result.sample_counts.resize(first.sample_counts.empty() ? 0 : result.entries());
+  const std::vector<Plane> targets = result.planes();
+  for (std::size_t t = 0; t < tables.size(); ++t) {
+    Table table = tables[t];
+    const std::vector<Plane> sources = table.planes();
+    if (sources.size() != targets.size()) {
+      throw refused("keeps other planes than " + names[0].string(), names[t], "render all with the same options");
+    }
+    std::vector<std::size_t> places;
+    for (const double value : axis(table).values) {
+      places.push_back(static_cast<std::size_t>(std::lower_bound(joined.values.begin(), joined.values.end(), value) -
+                                                joined.values.begin()));
+    }
+    for (std::size_t entry = 0; entry < table.entries(); ++entry) {
+      const std::size_t o = table.theta_o_index(entry), i = table.theta_i_index(entry);
+      const std::size_t line = table.parameter_row(entry) * result.lines_per_parameter() + (views ? places[o] : o);
+      const std::size_t target =
+          line * result.width() + (views ? i : places[i]) * table.grid.phi.size() + table.phi_index(entry);
+      for (std::size_t p = 0; p < sources.size(); ++p) targets[p].data[target] = sources[p].data[entry];
+      result.valid[target] = table.valid[entry];
+    }
+  }
+  return result;
 }
 
 }  // namespace lobefit

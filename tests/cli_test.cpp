@@ -1,4 +1,8 @@
 // The command line as scripts see it: exit codes, messages, files, JSON.
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfOutputFile.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -230,6 +234,33 @@ TEST_F(CommandLine, KilledAndInterruptedRendersGoOnToTheSameFile) {
   EXPECT_EQ(files(), (std::vector<std::string>{"g.json", "t.exr"}));
 }
 
+TEST_F(CommandLine, LatLongPicturesOfSeveralViewsBecomeOneTable) {
+  Imf::Header header(64, 16);
+  header.channels().insert("Y", Imf::Channel(Imf::FLOAT));
+  std::vector<float> pixels(64 * 16, 0.25f);
+  Imf::FrameBuffer frame;
+  frame.insert("Y", Imf::Slice::Make(Imf::FLOAT, pixels.data(), Imath::V2i(0, 0), 64, 16));
+  {
+    Imf::OutputFile file((folder_ / "lobe.exr").c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writePixels(16);
+  }
+  expect_refused("table info lobe.exr", 3, {"lobe.exr", "which direction it holds", "--wo"});
+  expect_refused("table info lobe.exr --wo 95,0", 2, {"--wo", "out of range"});
+  EXPECT_EQ(json("table info lobe.exr --wi 30,0")["format"], "lat_long");
+  for (const char* view : {"0", "30", "60"}) {
+    ASSERT_EQ(run(std::string("table convert lobe.exr --wo ") + view + ",0 -o view" + view + ".exr").code, 0);
+  }
+  ASSERT_EQ(run("table merge view60.exr view0.exr view30.exr -o views.exr").code, 0);
+  const Json info = json("table info views.exr");
+  EXPECT_EQ(info["axes"][0]["values"], (std::vector<double>{0.0, 30.0, 60.0}));
+  EXPECT_EQ(info["entries"], 3 * 64 * 16);
+  EXPECT_NEAR(json("eval views.exr --wi 40,170 --wo 45,0")["values"][0]["f"][0].get<double>(), 0.25, 1e-12);
+  expect_refused("table merge view0.exr view0.exr -o v.exr", 3, {"theta_o = 0 comes twice"});
+  expect_refused("table merge view0.exr view30.exr --partial -o v.exr", 2, {"--partial"});
+  expect_refused("table info views.exr --wo 0,0", 2, {"--wo"});
+}
+
 TEST_F(CommandLine, ShardsMergeToTheSameFile) {
   const std::string render = "render microfacet_diffuse --grid small --samples 64 --axis alpha=0.2,0.7 ";
   ASSERT_EQ(run(render + "-o whole.exr").code, 0);
@@ -437,7 +468,9 @@ TEST_F(CommandLine, FitCheckExportHangTogether) {
             std::string::npos);
   EXPECT_NE(shader.out.find("Lobefit_proxima_Fitted()"), std::string::npos);
   EXPECT_NE(shader.out.find("p.b = 0.11"), std::string::npos) << shader.out;
-  expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl"});
+  EXPECT_NE(run("export fit.json --lang c").out.find("    p.b = 0.11"), std::string::npos);
+  EXPECT_NE(run("export fit.json --lang wgsl").out.find("fn Lobefit_proxima_Fitted() -> "), std::string::npos);
+  expect_refused("export fit.json --lang cg", 2, {"cg", "hlsl", "wgsl"});
 }
 
 /// The Vulkan loader with no driver to offer, for a while.

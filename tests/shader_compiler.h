@@ -1,4 +1,5 @@
-// glslangValidator, which judges shader texts.
+// What judges shader texts: glslangValidator, for C the compilers of C and C++ with their warnings, for WGSL tint or
+// naga (neither is in Debian 12).
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,12 +13,63 @@
 
 namespace lobefit {
 
-inline bool has_shader_compiler() { return std::system("command -v glslangValidator > /dev/null") == 0; }
+inline bool has_shader_compiler(std::string_view language) {
+  return std::system(language == "c"      ? "command -v cc > /dev/null"
+                     : language == "wgsl" ? "command -v tint > /dev/null || command -v naga > /dev/null"
+                                          : "command -v glslangValidator > /dev/null") == 0;
+}
 
-/// Compiles a compute shader that stores `expression`, of three components, after `text`. Returns the compiler's
-/// complaint with the source, or "". `name` tells the temporary files of tests apart.
+/// A vector of three literals, such as "0.6".
+inline std::string vector_text(std::string_view language, const std::string& x, const std::string& y,
+                               const std::string& z) {
+  if (language == "c") return "Lobefit_make3(" + x + "f, " + y + "f, " + z + "f)";
+  return (language == "glsl" ? "vec3(" : language == "wgsl" ? "vec3f(" : "float3(") + x + ", " + y + ", " + z + ")";
+}
+
+/// Runs a command; what it printed where it failed, or "".
+inline std::string command_complaint(const std::string& command, const std::string& stem) {
+  const int status = std::system((command + " > '" + stem + ".log' 2>&1").c_str());
+  std::ostringstream log;
+  log << std::ifstream(stem + ".log").rdbuf();
+  std::remove((stem + ".log").c_str());
+  return status == 0 ? "" : command + "\n" + log.str();
+}
+
+inline constexpr std::string_view c_warnings =
+    "-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wdouble-promotion -Werror";
+
+/// Compiles a function that returns `expression` after `text`, as C99 and as C++.
+inline std::string c_complaint(const std::string& text, const std::string& expression, const std::string& name) {
+  const std::string stem = ::testing::TempDir() + "lobefit_" + name + "_c";
+  const std::string source =
+      text + "Lobefit_float3 result(void);\nLobefit_float3 result(void) { return " + expression + "; }\n";
+  std::ofstream(stem + ".c") << source;
+  std::string complaint;
+  for (const char* compiler : {"cc -std=c99", "c++ -x c++ -std=c++11"}) {
+    complaint += command_complaint(
+        std::string(compiler) + " " + std::string(c_warnings) + " -c -o /dev/null '" + stem + ".c'", stem);
+  }
+  std::remove((stem + ".c").c_str());
+  return complaint.empty() ? "" : complaint + source;
+}
+
+/// Validates a function that returns `expression` after `text`.
+inline std::string wgsl_complaint(const std::string& text, const std::string& expression, const std::string& name) {
+  const std::string stem = ::testing::TempDir() + "lobefit_" + name;
+  const std::string source = text + "\nfn result() -> vec3f { return " + expression + "; }\n";
+  std::ofstream(stem + ".wgsl") << source;
+  const std::string complaint = command_complaint("$(command -v tint || command -v naga) '" + stem + ".wgsl'", stem);
+  std::remove((stem + ".wgsl").c_str());
+  return complaint.empty() ? "" : complaint + source;
+}
+
+/// Compiles a compute shader that stores `expression`, of three components, after `text`; or what c_complaint() or
+/// wgsl_complaint() take. Returns the compiler's complaint with the source, or "". `name` tells the temporary files of
+/// tests apart.
 inline std::string shader_complaint(std::string_view language, const std::string& text, const std::string& expression,
                                     const std::string& name) {
+  if (language == "c") return c_complaint(text, expression, name);
+  if (language == "wgsl") return wgsl_complaint(text, expression, name);
   const bool is_glsl = language == "glsl";
   const std::string source =
       is_glsl ? "#version 450\nlayout(local_size_x = 1) in;\nlayout(std430, binding = 0) buffer Result { vec4 result; "
@@ -29,13 +81,10 @@ inline std::string shader_complaint(std::string_view language, const std::string
   const std::string stem = ::testing::TempDir() + "lobefit_" + name + "_" + std::string(language);
   std::ofstream(stem + ".comp") << source;
   const std::string flags = is_glsl ? "-V -S comp" : "-D -V -S comp -e main";
-  const std::string command =
-      "glslangValidator " + flags + " -o '" + stem + ".spv' '" + stem + ".comp' > '" + stem + ".log' 2>&1";
-  const int status = std::system(command.c_str());
-  std::ostringstream log;
-  log << std::ifstream(stem + ".log").rdbuf();
-  for (const char* ending : {".comp", ".spv", ".log"}) std::remove((stem + ending).c_str());
-  return status == 0 ? "" : log.str() + source;
+  const std::string complaint =
+      command_complaint("glslangValidator " + flags + " -o '" + stem + ".spv' '" + stem + ".comp'", stem);
+  for (const char* ending : {".comp", ".spv"}) std::remove((stem + ending).c_str());
+  return complaint.empty() ? "" : complaint + source;
 }
 
 }  // namespace lobefit

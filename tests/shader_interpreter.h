@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -59,6 +60,31 @@ inline ShaderValue run_intrinsic(std::string_view name, const std::vector<Shader
   if (name == "normalize")
     return by_component(x.at(0), {std::sqrt(dot(x.at(0), x.at(0)))}, [](double a, double b) { return a / b; });
   throw std::runtime_error("no intrinsic " + std::string(name));
+}
+
+/// What C texts call the intrinsics and the operations on vectors; none for another name.
+inline std::optional<ShaderValue> run_c_function(std::string_view name, const std::vector<ShaderValue>& x) {
+  if (name.starts_with("Lobefit_") && (name.ends_with("3") || name == "Lobefit_lerp")) {
+    name.remove_prefix(8);
+    if (name.ends_with("3")) name.remove_suffix(1);
+    if (name == "make") return ShaderValue{x.at(0).at(0), x.at(1).at(0), x.at(2).at(0)};
+    if (name == "splat") return ShaderValue{x.at(0).at(0), x.at(0).at(0), x.at(0).at(0)};
+    if (name == "add") return by_component(x.at(0), x.at(1), [](double a, double b) { return a + b; });
+    if (name == "subtract") return by_component(x.at(0), x.at(1), [](double a, double b) { return a - b; });
+    if (name == "multiply" || name == "scale")
+      return by_component(x.at(0), x.at(1), [](double a, double b) { return a * b; });
+    if (name == "divide") return by_component(x.at(0), x.at(1), [](double a, double b) { return a / b; });
+    for (const char* same : {"max", "dot", "normalize", "lerp"}) {
+      if (name == same) return run_intrinsic(name, x);
+    }
+    return {};
+  }
+  static const std::map<std::string_view, std::string_view> floats{
+      {"fminf", "min"}, {"fmaxf", "max"},  {"fabsf", "abs"}, {"floorf", "floor"}, {"sqrtf", "sqrt"},
+      {"expf", "exp"},  {"exp2f", "exp2"}, {"logf", "log"},  {"log2f", "log2"},   {"powf", "pow"}};
+  const auto found = floats.find(name);
+  if (found == floats.end()) return {};
+  return run_intrinsic(found->second, x);
 }
 
 /// Walks a shader's nodes.
@@ -128,7 +154,8 @@ class GraphInterpreter {
   const Shader& shader_;
 };
 
-/// Reads the subset of HLSL and GLSL that lobefit prints, by the grammar of C: ?: comparison sum product unary postfix.
+/// Reads the subset of HLSL, GLSL, C and WGSL that lobefit prints, by the grammar of C: ?: comparison sum product unary
+/// postfix.
 class TextInterpreter {
  public:
   using Variables = std::map<std::string, ShaderValue>;
@@ -136,25 +163,30 @@ class TextInterpreter {
   explicit TextInterpreter(std::string_view text) {
     split(text);
     while (at_ < tokens_.size()) {
+      const bool named_after = accept("typedef");
       if (accept("struct")) {
         while (!accept("}")) ++at_;
-        expect(";");
+        if (named_after) ++at_;
+        if (at_ < tokens_.size()) accept(";");
         continue;
       }
       accept("static");
+      accept("inline");
       if (accept("const")) {
         read_table();
         continue;
       }
-      ++at_;  // the result's type
+      ++at_;  // the result's type, or fn
       Function& function = functions_[next()];
       expect("(");
       while (!accept(")")) {
         accept(",");
-        ++at_;  // the argument's type
-        function.arguments.push_back(next());
+        if (accept("void")) continue;
+        const std::string first = next();  // the argument's type, or its name
+        function.arguments.push_back(accept(":") ? first : tokens_.at(at_));
+        ++at_;
       }
-      expect("{");
+      while (!accept("{")) ++at_;
       function.begin = at_;
       while (!accept("}")) ++at_;
     }
@@ -181,19 +213,33 @@ class TextInterpreter {
     std::size_t begin = 0;
   };
 
-  /// float name[size] = {…}; or = float[size](…);
+  /// float name[size] = {…}; or = float[size](…); or WGSL's name = array<f32, size>(…);
   void read_table() {
-    expect("float");
+    if (!accept("float")) {
+      const std::string name = next();
+      expect("=");
+      if (!accept("array")) {  // a number, which primary() knows
+        while (!accept(";")) ++at_;
+        return;
+      }
+      for (const char* part : {"<", "f32", ","}) expect(part);
+      read_entries(tables_[name], std::stoul(next()), 2);
+      return;
+    }
     ShaderValue& entries = tables_[next()];
     expect("[");
     const std::size_t size = std::stoul(next());
     expect("]");
     expect("=");
     if (accept("float")) at_ += 3;
-    ++at_;  // { or (
+    read_entries(entries, size, 1);
+  }
+
+  void read_entries(ShaderValue& entries, std::size_t size, std::size_t before) {
+    at_ += before;  // { or ( or >(
     do {
       const double sign = accept("-") ? -1.0 : 1.0;
-      entries.push_back(sign * std::stod(next()));
+      entries.push_back(sign * number(next()));
     } while (accept(","));
     ++at_;  // } or )
     expect(";");
@@ -227,6 +273,13 @@ class TextInterpreter {
     }
   }
 
+  static double number(const std::string& token) {
+    std::size_t length = 0;
+    const double value = std::stod(token, &length);
+    if (token.substr(length) != "" && token.substr(length) != "f") throw std::runtime_error("not a number: " + token);
+    return value;
+  }
+
   std::string next() { return tokens_.at(at_++); }
   bool accept(std::string_view token) {
     if (tokens_.at(at_) != token) return false;
@@ -241,12 +294,19 @@ class TextInterpreter {
     const std::size_t caller = at_;
     at_ = function.begin;
     while (!accept("return")) {
+      if (accept("(")) {  // (void)name;
+        for (const char* part : {"void", ")"}) expect(part);
+        ++at_;
+        expect(";");
+        continue;
+      }
       std::string name = next();
       if (accept(".")) {
         name += "." + next();  // p.alpha = …;
       } else {
         name = next();  // type name = …; or type name;
         if (variables.contains(name)) throw std::runtime_error(name + " is defined twice");
+        if (accept(":")) ++at_;  // var name: type;
         if (accept(";")) continue;
       }
       expect("=");
@@ -335,14 +395,17 @@ class TextInterpreter {
     }
     const std::string token = next();
     if (std::isdigit(static_cast<unsigned char>(token[0]))) {
-      std::size_t length = 0;
-      const double value = std::stod(token, &length);
-      if (length != token.size()) throw std::runtime_error("not a number: " + token);
-      return {value};
+      return {number(token)};
     }
     if (token == "LOBEFIT_PI") return {pi};
     if (tables_.contains(token)) {
-      for (const char* part : {"[", "int", "("}) expect(part);
+      expect("[");
+      if (accept("(")) {  // (int)(…)
+        for (const char* part : {"int", ")", "("}) expect(part);
+      } else {
+        if (!accept("i32")) expect("int");
+        expect("(");
+      }
       const auto index = static_cast<std::size_t>(ternary(variables).at(0));
       for (const char* part : {")", "]"}) expect(part);
       return {tables_.at(token).at(index)};
@@ -353,8 +416,11 @@ class TextInterpreter {
         accept(",");
         arguments.push_back(ternary(variables));
       }
-      if (token == "float3" || token == "vec3")
+      if (token == "select") return arguments.at(2).at(0) != 0.0 ? arguments[1] : arguments[0];
+      if (token == "vec3f" && arguments.size() == 1) return ShaderValue(3, arguments[0].at(0));
+      if (token == "float3" || token == "vec3" || token == "vec3f")
         return {arguments.at(0).at(0), arguments.at(1).at(0), arguments.at(2).at(0)};
+      if (const auto value = run_c_function(token, arguments)) return *value;
       return functions_.contains(token) ? call(token, arguments) : run_intrinsic(token, arguments);
     }
     if (tokens_.at(at_) == "." && variables.contains(token + "." + tokens_.at(at_ + 1))) {

@@ -174,6 +174,39 @@ TEST(ShaderText, LanguagesDifferInTheirWords) {
   EXPECT_EQ(body(constructed, "glsl"), "return vec3(a, b, c);");
 }
 
+TEST(ShaderText, CHasNoVectorOperators) {
+  // The arguments wi, wo, p of the printed function are a, b, c, v here; what the text leaves unread it says.
+  const auto in_c = [](auto&& build) {
+    std::string text = body(build, "c");
+    for (std::size_t at; (at = text.find("(void)")) != std::string::npos;) text.erase(at, text.find('\n', at) + 1 - at);
+    return text;
+  };
+  EXPECT_EQ(in_c([](E a, E b, E, V v) { return v * a + v / b; }),
+            "return Lobefit_add3(Lobefit_scale3(v, a), Lobefit_divide3(v, Lobefit_splat3(b)));");
+  EXPECT_EQ(in_c([](E a, E, E, V v) { return (1.0 - v) * (a + v); }),
+            "return Lobefit_multiply3(Lobefit_subtract3(Lobefit_splat3(1.0f), v), "
+            "Lobefit_add3(Lobefit_splat3(a), v));");
+  EXPECT_EQ(in_c([](E a, E b, E, V v) { return lerp(v, v * v, a) * (a + b); }),
+            "return Lobefit_scale3(Lobefit_lerp3(v, Lobefit_multiply3(v, v), Lobefit_splat3(a)), a + b);");
+  EXPECT_EQ(in_c([](E a, E b, E c, V) { return lerp(a, saturate(b), c); }),
+            "return Lobefit_lerp(a, fminf(fmaxf(b, 0.0f), 1.0f), c);");
+  EXPECT_EQ(in_c([](E a, E b, E, V v) { return pow(dot(v, v), a) + abs(b) * 0.1; }),
+            "return powf(fmaxf(Lobefit_dot3(v, v), 1e-36f), a) + fabsf(b) * 0.1f;");
+  EXPECT_EQ(in_c([](E a, E b, E, V v) { return select(a < b, v, max(normalize(v), 0.0)); }),
+            "return a < b ? v : Lobefit_max3(Lobefit_normalize3(v), Lobefit_splat3(0.0f));");
+  EXPECT_EQ(body([](E, E b, E, V) { return b * 2.0; }, "c"),
+            "(void)p;\n(void)a;\n(void)c;\n(void)v;\nreturn b * 2.0f;");
+}
+
+TEST(ShaderText, WgslPutsTypesBehindNamesAndSelectsByFunction) {
+  const auto in_wgsl = [](auto&& build) { return body(build, "wgsl"); };
+  EXPECT_EQ(in_wgsl([](E a, E b, E c, V) { return select(a < b, b, c); }), "return select(c, b, a < b);");
+  EXPECT_EQ(in_wgsl([](E a, E b, E c, V) { return let("mean", lerp(a, b, saturate(c))) * 2.0; }),
+            "let mean = mix(a, b, saturate(c));\nreturn mean * 2.0;");
+  EXPECT_EQ(in_wgsl([](E a, E, E, V v) { return max(v * a, 0.0); }), "return max(v * a, vec3f(0.0));");
+  EXPECT_EQ(in_wgsl([](E a, E b, E c, V) { return V(a, b, c); }), "return vec3f(a, b, c);");
+}
+
 /// Some expression of inputs a, b, c and literals that float holds exactly.
 Expression random_expression(Expression a, Expression b, Expression c, int depth) {
   const int kind = *rc::gen::inRange(0, depth > 0 ? 10 : 2);
@@ -328,15 +361,15 @@ TEST(Shader, StatesParametersWithRangesValuesAndProvenance) {
 }
 
 TEST(Shader, UnknownLanguageIsAUsageError) {
-  EXPECT_EQ(shader_languages(), (std::vector<std::string>{"hlsl", "glsl"}));
+  EXPECT_EQ(shader_languages(), (std::vector<std::string>{"hlsl", "glsl", "c", "wgsl"}));
   try {
-    print_model(find_model("lambert"), "wgsl");
+    print_model(find_model("lambert"), "cg");
     FAIL() << "no error was thrown";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::usage);
     const std::string message = error.what();
-    EXPECT_NE(message.find("'wgsl'"), std::string::npos) << message;
-    EXPECT_NE(message.find("hlsl, glsl"), std::string::npos) << message;
+    EXPECT_NE(message.find("'cg'"), std::string::npos) << message;
+    EXPECT_NE(message.find("hlsl, glsl, c, wgsl"), std::string::npos) << message;
   }
 }
 
@@ -396,7 +429,7 @@ bool is_no_part_of_the_brdf(std::string_view parameter) {
 TEST_P(ShaderOfModel, HasItsPartsOnce) {
   EXPECT_EQ(occurrences(text_, "struct " + name_ + "_Parameters {"), 1u);
   EXPECT_EQ(occurrences(text_, " " + name_ + "("), 1u);
-  EXPECT_EQ(occurrences(text_, " " + name_ + "_Fitted() {"), 1u);
+  EXPECT_EQ(occurrences(text_, " " + name_ + (language_ == "c" ? "_Fitted(void) " : "_Fitted() ")), 1u);
   for (const ParameterInfo& info : model_.parameters) {
     EXPECT_EQ(occurrences(text_, "    p." + std::string(info.name) + " = "), 1u) << info.name;
     const std::string place = std::string(model_.info->name) + "." + std::string(info.name);
@@ -410,13 +443,29 @@ TEST_P(ShaderOfModel, HasItsPartsOnce) {
 }
 
 TEST_P(ShaderOfModel, IsAcceptedByAShaderCompiler) {
-  if (!has_shader_compiler()) {
-    GTEST_SKIP() << "glslangValidator is not installed (Debian: glslang-tools): no compiler to judge the text";
+  if (!has_shader_compiler(language_)) {
+    GTEST_SKIP() << "no compiler to judge the text: glslangValidator (Debian: glslang-tools); cc; tint or naga";
   }
-  const std::string vector = language_ == "glsl" ? "vec3" : "float3";
-  const std::string call =
-      name_ + "(" + vector + "(0.6, 0.0, 0.8), " + vector + "(0.0, 0.0, 1.0), " + name_ + "_Fitted())";
+  const std::string call = name_ + "(" + vector_text(language_, "0.6", "0.0", "0.8") + ", " +
+                           vector_text(language_, "0.0", "0.0", "1.0") + ", " + name_ + "_Fitted())";
   EXPECT_EQ(shader_complaint(language_, text_, call, std::get<0>(GetParam())), "");
+}
+
+TEST(Shader, AllModelsStandInOneText) {
+  // Callees are guarded, and some models call one function on scalars and others on vectors. In C no term is among
+  // them: it has the name of the function that they call.
+  for (const std::string& language : shader_languages()) {
+    if (language == "wgsl" || !has_shader_compiler(language)) continue;  // WGSL has no guards: a text stands alone
+    std::string text;
+    for (const Model& model : models()) {
+      if (language != "c" || !is_term(model.info->kind)) text += print_model(model, language);
+    }
+    const std::string up = vector_text(language, "0.0", "0.0", "1.0");
+    EXPECT_EQ(shader_complaint(language, text,
+                               "Lobefit_hair_unreal(" + up + ", " + up + ", Lobefit_hair_unreal_Fitted())", "all")
+                  .substr(0, 2000),
+              "");
+  }
 }
 
 /// Largest difference of `value(wi, wo)` from the double model over random pairs, relative to 1 + |f|.

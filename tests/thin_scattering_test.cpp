@@ -384,7 +384,7 @@ class ThinScatteringShader : public ::testing::TestWithParam<std::string> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(Languages, ThinScatteringShader, ::testing::Values("hlsl", "glsl"),
+INSTANTIATE_TEST_SUITE_P(Languages, ThinScatteringShader, ::testing::Values("hlsl", "glsl", "c", "wgsl"),
                          [](const auto& test) { return test.param; });
 
 TEST_P(ThinScatteringShader, GraphEqualsTheText) {

@@ -18,8 +18,8 @@ namespace {
 
 constexpr std::string_view exr_magic = "\x76\x2f\x31\x01";
 constexpr std::string_view readable =
-    "lobefit reads its own tables (.exr), MERL .binary, RGL .bsdf, UTIA .bin, ALTA text, LBNL/Klems XML and NBRDF "
-    "weights";
+    "lobefit reads its own tables and lat-long pictures (.exr), MERL .binary, RGL .bsdf, UTIA .bin, ALTA text, "
+    "LBNL/Klems XML and NBRDF weights";
 
 /// A format that starts like a text of keywords, with one of these near its top.
 bool has_any(std::string_view text, std::initializer_list<std::string_view> keywords) {
@@ -34,6 +34,12 @@ std::int32_t first_integer(std::string_view bytes) {
   return value;
 }
 
+void refuse_held(const ReadOptions& options) {
+  if (!options.held) return;
+  throw Error(ExitCode::usage, "the file holds the directions of all its values", "--wo, --wi",
+              "leave them out: they are for lat-long pictures");
+}
+
 }  // namespace
 
 BrdfFile read_brdf_file(const std::filesystem::path& path, const ReadOptions& options) {
@@ -46,9 +52,14 @@ BrdfFile read_brdf_file(const std::filesystem::path& path, const ReadOptions& op
     std::array<char, 4> magic{};
     std::ifstream(path, std::ios::binary).read(magic.data(), magic.size());
     if (std::string_view(magic.data(), magic.size()) == exr_magic) {
+      if (LatLong::recognise(path)) {
+        return {.format = FileFormat::lat_long, .table = LatLong::read(path, options.held)};
+      }
+      refuse_held(options);
       return {.format = FileFormat::exr, .table = Table::read(path)};
     }
   }
+  refuse_held(options);
   const std::string bytes = read_file(path);
   if (bytes.empty()) throw Error(ExitCode::invalid_input, "the file is empty", place, std::string(readable));
   if (bytes.starts_with("tensor_file")) {
@@ -187,6 +198,7 @@ void write_brdf_file(const BrdfFile& file, FileFormat format, const std::filesys
     }
     case FileFormat::utia:
     case FileFormat::klems:
+    case FileFormat::lat_long:
     case FileFormat::neural_brdf: break;
   }
   throw Error(ExitCode::usage, "this format is only read", path.string(), "choose exr, merl, rgl, alta or csv");

@@ -11,23 +11,26 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "reference/brdf_pair.h"
+#include "reference/formats/lat_long.h"
 #include "reference/formats/rgl.h"
 #include "reference/formats/utia.h"
 #include "reference/table.h"
 
 namespace lobefit {
 
-enum class FileFormat { exr, merl, rgl, utia, alta, klems, neural_brdf, csv };
-inline constexpr std::array<std::string_view, 8> file_format_names{"exr",  "merl",  "rgl",         "utia",
-                                                                   "alta", "klems", "neural_brdf", "csv"};
+enum class FileFormat { exr, merl, rgl, utia, alta, klems, neural_brdf, csv, lat_long };
+inline constexpr std::array<std::string_view, 9> file_format_names{"exr",   "merl",        "rgl", "utia",    "alta",
+                                                                   "klems", "neural_brdf", "csv", "lat_long"};
 
 struct ReadOptions {
   std::string material;  // of files that hold several
   Utia::Scale utia_scale = Utia::Scale::raw;
+  std::optional<LatLong::Held> held = std::nullopt;  // of lat-long pictures that do not say it
 };
 
 struct BrdfFile {
