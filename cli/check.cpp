@@ -7,6 +7,7 @@
 #include "cli/slice.h"
 #include "evaluate/check.h"
 #include "evaluate/shader.h"
+#include "evaluate/spirv.h"
 #include "evaluate/vulkan_evaluator.h"
 
 namespace lobefit {
@@ -29,7 +30,7 @@ struct Devices {
 
   void add_vulkan(const std::string& which, const std::string& language) {
     vulkan.push_back(std::make_unique<const VulkanDevice>(which));
-    for (const std::string& each : shader_languages()) {
+    for (const std::string& each : spirv_languages()) {
       if (language != "all" && language != each) continue;
       evaluators.push_back(std::make_unique<const VulkanEvaluator>(*vulkan.back(), each));
     }

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "cli/arguments.h"
+#include "cli/constants_page.h"
 #include "cli/output_folder.h"
 #include "cli/refit_approximations.h"
 #include "cli/refit_curves.h"
@@ -13,8 +14,10 @@
 #include "cli/substrate_rules.h"
 #include "evaluate/check.h"
 #include "evaluate/shader.h"
+#include "fit/forms.h"
 #include "fit/recipe.h"
 #include "reference/output_file.h"
+#include "reference/targets.h"
 #include "report/figure.h"
 
 namespace lobefit {
@@ -134,7 +137,9 @@ void write_figures(const RecipeResult& result, const OutputFolder& folder) {
     };
     write("slices", slice_figure(table, lines, {}, line.row->name), slice_figure_size(table, {}));
     if (table.grid.theta_o.size() > 1) {
-      const SliceChoice oblique{.theta_o = table.grid.theta_o.size() * 2 / 3, .both_sides = true};
+      const std::vector<double>& phi = table.grid.phi.values;
+      const SliceChoice oblique{.theta_o = table.grid.theta_o.size() * 2 / 3,
+                                .both_sides = phi.front() == 0.0 && phi.back() == 180.0};
       write("slices_oblique", slice_figure(table, lines, oblique, line.row->name), slice_figure_size(table, oblique));
       const std::vector<LabelledTable> few = labelled(result, line, 4);
       for (const bool retro : {true, false}) {
@@ -238,6 +243,74 @@ void run(const std::string& name, const std::string& output, bool resume, const 
   }
 }
 
+/// Every shipped recipe into a folder of its own, and a page of all constants.
+void run_all(const fs::path& folder, bool resume, const Context& context) {
+  std::vector<RecipeOutcome> outcomes;
+  for (const std::string& recipe : shipped_recipes()) {
+    run(recipe, (folder / recipe).string(), resume, context);
+    const fs::path result = folder / recipe / "result.json";
+    outcomes.push_back({recipe, recipe, parse_json(read_file(result), result.string())});
+  }
+  OutputFile page(folder / "constants.md", true);
+  page.write(constants_page(outcomes, context.command));
+  page.commit();
+  context.say(fmt::format("every constant on one page: {}", (folder / "constants.md").string()));
+}
+
+Json forms_json() {
+  Json list = Json::array(), targets_list = Json::array();
+  for (const Form& form : forms()) {
+    Json constants = Json::array();
+    for (const FormConstant& constant : form.constants) {
+      constants.push_back(
+          {{"name", constant.name}, {"value", constant.initial}, {"lower", constant.lower}, {"upper", constant.upper}});
+    }
+    list.push_back({{"name", form.name},
+                    {"title", form.title},
+                    {"formula", form.formula},
+                    {"source", form.source},
+                    {"arguments", form.arguments},
+                    {"constants", constants}});
+  }
+  for (const Target& target : targets()) {
+    Json arguments = Json::array();
+    for (const ParameterInfo& info : target.arguments) {
+      arguments.push_back(
+          {{"name", info.name}, {"lower", info.lower}, {"upper", info.upper}, {"default", info.initial}});
+    }
+    targets_list.push_back({{"name", target.name},
+                            {"title", target.title},
+                            {"source", target.source},
+                            {"arguments", arguments},
+                            {"derived", target.derived_names}});
+  }
+  return {{"forms", list}, {"targets", targets_list}};
+}
+
+/// What recipes of closed forms can name.
+void list_forms(const Context& context) {
+  if (context.json) {
+    std::cout << forms_json().dump(2) << "\n";
+    return;
+  }
+  fmt::print("Closed forms (their constants start as published):\n");
+  for (const Form& form : forms()) {
+    fmt::print("  {:<34} {}\n  {:<34} {}\n  {:<34} of {}\n", form.name, form.title, "", form.formula, "",
+               fmt::join(form.arguments, ", "));
+  }
+  fmt::print("\nTargets, the exact functions that they stand for:\n");
+  for (const Target& target : targets()) {
+    std::string arguments;
+    for (const ParameterInfo& info : target.arguments) {
+      arguments += fmt::format("{}{} {:g} … {:g}", arguments.empty() ? "" : ", ", info.name, info.lower, info.upper);
+    }
+    if (!target.derived_names.empty()) {
+      arguments += fmt::format("; from them {}", fmt::join(target.derived_names, ", "));
+    }
+    fmt::print("  {:<34} {}\n  {:<34} of {}\n", target.name, target.title, "", arguments);
+  }
+}
+
 }  // namespace
 
 void add_refit(CLI::App& app, Context& context) {
@@ -251,15 +324,20 @@ void add_refit(CLI::App& app, Context& context) {
                                           shipped);
   struct Arguments {
     std::string name, output;
-    bool all = false, resume = false;
+    bool all = false, resume = false, forms = false;
   };
   const auto a = std::make_shared<Arguments>();
   auto* name = verb->add_option("RECIPE", a->name, "Shipped recipe or JSON file");
   auto* all = verb->add_flag("--all", a->all, "Every shipped recipe");
   name->excludes(all);
-  verb->add_option("-o,--output", a->output, "Folder for the results (default: out/RECIPE)");
+  verb->add_flag("--forms", a->forms, "List the closed forms and exact functions that recipes of forms can name")
+      ->excludes(name)
+      ->excludes(all);
+  verb->add_option("-o,--output", a->output,
+                   "Folder for the results (default: out/RECIPE; with --all out, and a page of all constants)");
   verb->add_flag("--resume", a->resume, "Go on with the tables that an interrupted run kept (substrate-rules)");
   verb->callback([&context, a] {
+    if (a->forms) return list_forms(context);
     if (a->name.empty() && !a->all) {
       throw Error(ExitCode::usage, "refit what?", "refit", "name a recipe, or use --all");
     }
@@ -267,9 +345,7 @@ void add_refit(CLI::App& app, Context& context) {
       run(a->name, a->output, a->resume, context);
       return;
     }
-    for (const std::string& recipe : shipped_recipes()) {
-      run(recipe, a->output.empty() ? "" : (fs::path(a->output) / recipe).string(), a->resume, context);
-    }
+    run_all(a->output.empty() ? fs::path("out") : fs::path(a->output), a->resume, context);
   });
 }
 

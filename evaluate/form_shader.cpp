@@ -61,7 +61,7 @@ std::string form_shader(std::string_view form, std::string_view language_name, s
   std::string text;
   find_form_type(form, [&]<class F>() {
     const Shader shader = trace_form<F>(constants);
-    text = fmt::format("// {}: {}\n// Source: {}.\n", F::title, F::formula, F::source);
+    text = fmt::format("// {}.\n// Source: {}.\n", F::title, F::source);
     for (const std::string& line : provenance) text += "// " + line + "\n";
     std::string arguments;
     for (const std::string_view argument : F::arguments) {

@@ -410,21 +410,22 @@ std::string reading_text(const FormReading& reading) {
                      reading.domain.empty() ? "" : ", " + reading.domain);
 }
 
+/// Of rows that are fitted once: which readings give their published constants.
 std::string conclusion_of(const std::vector<ApproximationFit>& fits) {
-  std::string text;
+  std::string found, missed;
   for (const ApproximationFit& fit : fits) {
-    if (!fit.row->has_published || fit.row->free.empty() || fit.readings.empty()) continue;
-    const FormReading& nearest = fit.readings.front();
-    const bool found = std::any_of(fit.readings.begin(), fit.readings.end(),
-                                   [](const FormReading& reading) { return reading.meets_published; });
-    text += fmt::format(
-        "{}{}: largest {} error {:.3g} published, {:.3g} refitted; {}", text.empty() ? "" : " ",
-        fit.row->name + (fit.row->each.empty() ? "" : fmt::format(" ({} {:g})", fit.row->each, fit.each_value)),
-        form_metric_names[static_cast<std::size_t>(fit.row->metric)], fit.published.max, fit.refit.max,
-        found ? "the published constants are the optimum by " + reading_text(nearest) + "."
-              : fmt::format("no reading gives the published constants, the nearest ({}) misses by {:.2g} %.",
-                            reading_text(nearest), 100.0 * nearest.distance));
+    if (!fit.row->each.empty() || fit.readings.empty()) continue;
+    const auto meets = std::ranges::find(fit.readings, true, &FormReading::meets_published);
+    if (meets != fit.readings.end()) {
+      found += fmt::format("{}{} ({})", found.empty() ? "" : ", ", fit.row->name, reading_text(*meets));
+    } else {
+      missed += fmt::format("{}{} ({:.2g} % off)", missed.empty() ? "" : ", ", fit.row->name,
+                            100.0 * fit.readings.front().distance);
+    }
   }
+  std::string text;
+  if (!found.empty()) text = "The published constants are the best by some reading in " + found + ".";
+  if (!missed.empty()) text += (text.empty() ? "" : " ") + ("By none that was tried in " + missed + ".");
   return text;
 }
 

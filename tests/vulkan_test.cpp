@@ -88,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(Models, ShaderOnVulkan, ::testing::ValuesIn(model_names
 
 TEST_P(ShaderOnVulkan, EqualsTheModel) {
   Monitor silent;
-  for (const std::string& language : shader_languages()) {
+  for (const std::string& language : spirv_languages()) {
     const VulkanEvaluator evaluator(device(), language);
     const CheckResult result = check_model(model_, all_varied(model_), few_pairs(), evaluator, silent);
     EXPECT_TRUE(result.passed) << result.json().dump(2);
@@ -125,7 +125,7 @@ TEST_F(Vulkan, FittedReturnsTheParameters) {
       }
     }
     const std::vector<float> rounded(defaults.flat().begin(), defaults.flat().end());
-    for (const std::string& language : shader_languages()) {
+    for (const std::string& language : spirv_languages()) {
       EXPECT_EQ(plane_of(device(), language, model_text(model, language), statements, rounded.size()), rounded) << name;
     }
   }
@@ -137,7 +137,7 @@ TEST_F(Vulkan, TablesAreInTheText) {
     const Shader shader = find_float_model(model.info->name).trace();
     for (const ShaderTable& table : shader.tables) {
       const std::string statement = "    lobefit_outputs[i] = Lobefit_" + table.name + "_entries[i];\n";
-      for (const std::string& language : shader_languages()) {
+      for (const std::string& language : spirv_languages()) {
         const std::vector<float> found =
             plane_of(device(), language, model_text(model, language), statement, table.entries.size());
         EXPECT_TRUE(std::ranges::equal(found, table.entries)) << table.name << " in " << language;
@@ -175,7 +175,7 @@ class TamperedEvaluator : public FloatDevice {
 TEST_F(Vulkan, AnotherConstantIsCaught) {
   const Model& model = find_model("burley");
   Monitor silent;
-  for (const std::string& language : shader_languages()) {
+  for (const std::string& language : spirv_languages()) {
     const std::string text = model_text(model, language);
     const TamperedEvaluator same(device(), language, text);
     EXPECT_TRUE(check_model(model, all_varied(model), few_pairs(), same, silent).passed);
@@ -222,7 +222,7 @@ TEST_F(Vulkan, ItemsKeepTheirNumbersInChunks) {
   // From one dispatch to chunks of one item and more.
   for (const std::uint64_t range : {std::uint64_t{1} << 30, std::uint64_t{40'000}, std::uint64_t{1000}}) {
     const VulkanDevice small("", range);
-    for (const std::string& language : shader_languages()) {
+    for (const std::string& language : spirv_languages()) {
       std::ranges::fill(sum, -1.0f);
       std::ranges::fill(number, -1.0f);
       const std::array<std::span<const float>, 2> in{a, b};
@@ -297,7 +297,7 @@ TEST(Spirv, EveryShaderIsValid) {
   });
   for (const Model& model : models()) {
     const ParameterBlocks parameters{{std::vector<float>(model.defaults().flat().size())}, 64};
-    for (const std::string& language : shader_languages()) {
+    for (const std::string& language : spirv_languages()) {
       const std::vector<std::uint32_t> spirv =
           compile_shader(language, evaluation_shader(model, language, model_text(model, language), parameters).text);
       EXPECT_TRUE(tools.Validate(spirv)) << model.info->name << " in " << language << ": " << complaints;
@@ -307,7 +307,7 @@ TEST(Spirv, EveryShaderIsValid) {
 
 TEST(Spirv, ComplaintsQuoteTheLine) {
   const std::string body = "    lobefit_outputs[i] = 1.0;\n    lobefit_outputs[i] = wrong_name * 2.0;\n";
-  for (const std::string& language : shader_languages()) {
+  for (const std::string& language : spirv_languages()) {
     const Error error = error_of([&] {
       compile_shader(language, vulkan_shader(language, std::vector<VulkanArray>{{"unused", 1}}, "", body));
     });

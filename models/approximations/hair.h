@@ -144,7 +144,7 @@ struct HairTrtExponent {
 struct HairTrtFresnel {
   static constexpr std::string_view name = "hair_trt_fresnel", title = "Fresnel factors of TRT at one offset",
                                     formula = "(1 - F)² F, F = f0 + (1 - f0)(1 - g cosθ_d)⁵",
-                                    source = "S3, code: g = ½, h = √3/2";
+                                    source = "S3, code: g = 1/2, h = sqrt(3)/2";
   static constexpr std::array<std::string_view, 2> arguments{"cos_theta_d", "f0"};
   static constexpr std::array constants{FormConstant{"g", 0.5, 0.0, 1.0}};
 

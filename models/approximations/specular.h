@@ -13,7 +13,7 @@ namespace lobefit {
 struct SchlickMaskingForm {
   static constexpr std::string_view name = "schlick_masking", title = "Schlick's masking",
                                     formula = "G1 = μ/(μ (1 - k) + k), k = c α^p",
-                                    source = "Schlick 1994; Karis 2013 (c = ½ for GGX, √(2/π) for Beckmann)";
+                                    source = "Schlick 1994; Karis 2013 (c = 1/2 for GGX, sqrt(2/pi) for Beckmann)";
   static constexpr std::array<std::string_view, 2> arguments{"cos_theta", "alpha"};
   static constexpr std::array constants{FormConstant{"c", 0.5, 0.0, 2.0}, FormConstant{"p", 1.0, 0.1, 4.0}};
 
@@ -111,7 +111,7 @@ struct GgxAlbedoWith {
 struct GgxAlbedoWithSchlickK : GgxAlbedoWith<SchlickMaskingForm> {
   static constexpr std::string_view name = "ggx_albedo_with_schlick_k", title = "Albedo of GGX under Schlick's masking",
                                     formula = "∫ D G1(μ_i) G1(μ_o)/(4 μ_o) dω_i, k = c α^p",
-                                    source = "Karis 2013 (c = ½)";
+                                    source = "Karis 2013 (c = 1/2)";
 };
 struct GgxAlbedoWithJointVisibility : GgxAlbedoWith<JointVisibilityForm> {
   static constexpr std::string_view name = "ggx_albedo_with_joint_visibility",
@@ -148,7 +148,7 @@ struct SphericalGaussianFresnelForm {
 struct LazanyiFresnelForm {
   static constexpr std::string_view name = "lazanyi_fresnel", title = "Schlick's term for metals",
                                     formula = "F = f0 + (1 - f0)(1 - c)⁵ - a c (1 - c)^n",
-                                    source = "Lazányi, Szirmay-Kalos 2005; Hoffman 2019 (n = 6)";
+                                    source = "Lazanyi, Szirmay-Kalos 2005; Hoffman 2019 (n = 6)";
   static constexpr std::array<std::string_view, 2> arguments{"cosine", "f0"};
   static constexpr std::array constants{FormConstant{"a", 0.0, -5.0, 10.0}, FormConstant{"n", 6.0, 1.0, 12.0}};
 

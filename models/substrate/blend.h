@@ -69,12 +69,13 @@ LOBEFIT_TEXT Slab::Parameters<T> lerp_slabs(const Slab::Parameters<T>& a, const 
   result.roughness = lerp(a.roughness, b.roughness, t);
   result.anisotropy = lerp(a.anisotropy, b.anisotropy, t);
   // A slab without a second lobe has no roughness for it.
-  const T second = let("second", lerp(a.second_roughness_weight, b.second_roughness_weight, t));
-  result.second_roughness = select(second > 0.0,
-                                   (a.second_roughness * a.second_roughness_weight * (1.0 - t) +
-                                    b.second_roughness * b.second_roughness_weight * t) /
-                                       max(second, 1e-9),
-                                   a.second_roughness);
+  // Their sum, where a lerp would lose the little that is left of one.
+  const T second_a = let("second_a", a.second_roughness_weight * (1.0 - t));
+  const T second_b = let("second_b", b.second_roughness_weight * t);
+  const T second = let("second", second_a + second_b);
+  result.second_roughness =
+      select(second > 0.0, (a.second_roughness * second_a + b.second_roughness * second_b) / max(second, 1e-9),
+             a.second_roughness);
   result.second_roughness_weight = second;
   const T fuzz = let("fuzz", lerp(a.fuzz_amount, b.fuzz_amount, t));
   const T fuzz_share = let("fuzz_share", b.fuzz_amount * t / max(fuzz, 1e-9));
