@@ -181,7 +181,7 @@ void add_albedo(CLI::App& app, Context& context) {
       } else if (source.albedo_of_light && fixed == FixedDirection::light) {
         result = source.albedo_of_light(radians(theta));
       } else {
-        result = directional_albedo(source.evaluate, radians(theta), fixed, domain);
+        result = directional_albedo(source.evaluate, radians(theta), fixed, domain, 1e-6, monitor.get());
       }
       albedo.push_back(rgb_json(result.value, source.channels));
       error.push_back(rgb_json(result.error, source.channels));

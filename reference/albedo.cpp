@@ -11,15 +11,17 @@ namespace lobefit {
 namespace {
 
 Rgb integrate(const std::function<Rgb(const Direction&, const Direction&)>& brdf, double theta, FixedDirection fixed,
-              AlbedoDomain domain, int panels) {
+              AlbedoDomain domain, int panels, Monitor& monitor) {
   const Direction still = direction(theta, 0.0);
   const int azimuths = 8 * panels;
   // Each panel is one term of a sum in fixed order.
   std::vector<Rgb> parts(static_cast<std::size_t>(panels));
+  monitor.begin("albedo over " + std::to_string(panels) + " panels", static_cast<std::uint64_t>(panels));
   tbb::parallel_for(0, panels, [&](int panel) {
     const double width = (domain == AlbedoDomain::hemisphere ? 0.5 : 1.0) * pi / panels;
     Rgb sum;
     const auto ring = [&](double polar) {
+      monitor.check();
       Rgb ring_sum;
       for (int k = 0; k < azimuths; ++k) {
         const Direction moving = direction(polar, 2.0 * pi * (k + 0.5) / azimuths);
@@ -37,7 +39,9 @@ Rgb integrate(const std::function<Rgb(const Direction&, const Direction&)>& brdf
       if (offset > 0.0) sum = sum + ring(middle - offset) * weight;
     }
     parts[static_cast<std::size_t>(panel)] = sum;
+    monitor.advance(1);
   });
+  monitor.end();
   Rgb sum;
   for (const Rgb& part : parts) sum = sum + part;
   return sum;
@@ -46,11 +50,13 @@ Rgb integrate(const std::function<Rgb(const Direction&, const Direction&)>& brdf
 }  // namespace
 
 Albedo directional_albedo(const std::function<Rgb(const Direction&, const Direction&)>& brdf, double theta,
-                          FixedDirection fixed, AlbedoDomain domain, double tolerance) {
+                          FixedDirection fixed, AlbedoDomain domain, double tolerance, Monitor* monitor) {
+  Monitor silent;
+  Monitor& watch = monitor ? *monitor : silent;
   // An even number of panels over a sphere has the horizon between two of them.
-  Rgb coarse = integrate(brdf, theta, fixed, domain, domain == AlbedoDomain::hemisphere ? 1 : 2);
+  Rgb coarse = integrate(brdf, theta, fixed, domain, domain == AlbedoDomain::hemisphere ? 1 : 2, watch);
   for (int panels = domain == AlbedoDomain::hemisphere ? 2 : 4;; panels *= 2) {
-    const Rgb fine = integrate(brdf, theta, fixed, domain, panels);
+    const Rgb fine = integrate(brdf, theta, fixed, domain, panels, watch);
     const Rgb error{abs(fine.x - coarse.x), abs(fine.y - coarse.y), abs(fine.z - coarse.z)};
     const double worst = max(error.x, max(error.y, error.z));
     const double size = max(abs(fine.x), max(abs(fine.y), abs(fine.z)));

@@ -23,10 +23,10 @@ enum class AlbedoDomain {
 
 /// ∫ f cosine dω over the direction that is not fixed, the fixed one at `theta` radians. Gauss-Legendre panels in
 /// the polar angle × midpoints in azimuth, both doubled until two refinements agree to `tolerance` (relative) or 256
-/// panels are reached.
+/// panels are reached. `monitor` hears of each refinement and may stop it.
 Albedo directional_albedo(const std::function<Rgb(const Direction& wi, const Direction& wo)>& brdf, double theta,
-                          FixedDirection fixed, AlbedoDomain domain = AlbedoDomain::hemisphere,
-                          double tolerance = 1e-6);
+                          FixedDirection fixed, AlbedoDomain domain = AlbedoDomain::hemisphere, double tolerance = 1e-6,
+                          Monitor* monitor = nullptr);
 
 /// The same by Monte Carlo, for any reference.
 Estimate estimate_albedo(const Integrator& integrator, double theta, FixedDirection fixed, AlbedoDomain domain,

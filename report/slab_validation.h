@@ -2,6 +2,7 @@
 // (simplification) and against the layers as matter (model).
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "reference/monitor.h"
 #include "reference/substrate/physical_surface.h"
 #include "reference/table.h"
+#include "report/sphere.h"
 
 namespace lobefit {
 
@@ -53,6 +55,9 @@ class TreeJudge {
   double quick_error(std::span<const SimplifyStep> steps) const;
   /// rms of the truth's standard errors, of albedos relative: what no error can be told below.
   double truth_error() const { return truth_error_; }
+  /// The same of a sphere of matter: half the mean ΔE_ITP between those of either half of the samples. 0 without
+  /// spheres.
+  double sphere_truth_error() const { return sphere_truth_error_; }
 
  private:
   struct View {
@@ -63,14 +68,20 @@ class TreeJudge {
   std::vector<View> shown(std::span<const SimplifyStep> steps, int albedo_steps,
                           const WalkOptions& walk_options = {}) const;
   TreeErrors compare(const std::vector<View>& shown, const std::vector<View>& truth) const;
+  void render_matter_sphere(const PhysicalSurface& matter, Monitor& monitor);
+  SphereBrdf brdf_of(std::span<const SimplifyStep> steps) const;
+  /// Mean ΔE_ITP of lit spheres; below 0 where they share no pixel.
+  double sphere_difference(const SphereBrdf& a, const SphereBrdf& b) const;
 
   SlabTree tree_;
   FittedBlend::Constants<double> constants_;
   ValidationOptions options_;
   std::vector<Direction> views_, lights_;
   std::vector<View> truth_, full_;
+  /// f of matter where the sphere's pixels look, by wi and wo: of either half of the samples.
+  std::map<std::array<double, 6>, std::array<Rgb, 2>> matter_;
   bool smooth_ = false;
-  double truth_error_ = 0.0;
+  double truth_error_ = 0.0, sphere_truth_error_ = 0.0;
 };
 
 struct ValidatedStage {
@@ -90,7 +101,7 @@ struct ValidatedStrategy {
 struct SlabValidation {
   std::vector<ValidatedStrategy> strategies;
   std::vector<std::string> notes;
-  double truth_error = 0.0;
+  double truth_error = 0.0, sphere_truth_error = 0.0;
   SlabTree tree;
   TreeJudge::ExactStatistics exact;
 

@@ -321,7 +321,7 @@ TEST(Validation, ErrorDrivenIsNeverAboveTheBaseline) {
 TEST(Validation, SameBitsTwice) {
   const SlabTree tree = read_tree((data / "substrate/coated_metal.json").string());
   Monitor monitor;
-  const ValidationOptions options{.brdf_samples = 64, .albedo_paths = 1024, .spheres = false};
+  const ValidationOptions options{.brdf_samples = 64, .albedo_paths = 1024, .spheres = true};
   EXPECT_EQ(validate_tree(tree, shipped(), options, monitor).json({}),
             validate_tree(tree, shipped(), options, monitor).json({}));
 }
