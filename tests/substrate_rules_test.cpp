@@ -318,6 +318,21 @@ TEST(Validation, ErrorDrivenIsNeverAboveTheBaseline) {
   }
 }
 
+// Lambert without an interface is the same as matter and as a slab, but for the noise of the former.
+TEST(Validation, SpheresOfBareBodiesAgree) {
+  SlabTree tree;
+  SlabValues slab = default_slab();
+  slab.f0 = {0.0, 0.0, 0.0};
+  slab.diffuse_albedo = {0.6, 0.3, 0.1};
+  slab.diffuse_model = 2.0;
+  tree.root = tree.add_slab(slab);
+  Monitor monitor;
+  const TreeJudge judge(tree, shipped(), {.brdf_samples = 64, .albedo_paths = 1024}, monitor);
+  EXPECT_LE(judge.model({}).sphere_delta_e_itp, 0.05 + 2.0 * judge.sphere_truth_error());
+  EXPECT_LE(judge.sphere_truth_error(), 0.5);
+  EXPECT_EQ(judge.simplification({}).sphere_delta_e_itp, 0.0);
+}
+
 TEST(Validation, SameBitsTwice) {
   const SlabTree tree = read_tree((data / "substrate/coated_metal.json").string());
   Monitor monitor;
