@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "models/error.h"
+#include "reference/output_file.h"
 
 namespace lobefit {
 
@@ -31,6 +32,12 @@ OutputFolder::OutputFolder(fs::path destination, bool overwrite) : destination_(
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
   fs::remove_all(staging_, ignored);
+}
+
+void OutputFolder::write(const std::string& name, const std::string& text) const {
+  OutputFile file(path(name), true);
+  file.write(text);
+  file.commit();
 }
 
 void OutputFolder::commit() {

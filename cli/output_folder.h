@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace lobefit {
 
@@ -16,6 +17,8 @@ class OutputFolder {
 
   /// Where to write a file of this name before commit().
   std::filesystem::path path(const std::string& name) const { return staging_ / name; }
+  /// Writes a text file there.
+  void write(const std::string& name, const std::string& text) const;
   const std::filesystem::path& destination() const { return destination_; }
   /// Moves the files in; others that the destination holds stay.
   void commit();

@@ -190,18 +190,15 @@ void refit_constants(const fs::path& path, const std::string& output, const Cont
     hashes.push_back(sha256_of_file(folder.path(table.name + ".exr")));
   }
   for (const RecipeResultRow& line : result.rows) {
-    OutputFile fit(folder.path(stem(line) + ".fit.json"), true);
-    fit.write(line.fit.json(context.command, hashes[line.table]).dump(2) + "\n");
-    fit.commit();
+    folder.write(stem(line) + ".fit.json", line.fit.json(context.command, hashes[line.table]).dump(2) + "\n");
   }
   // The shader of each row's first set of constants, in each language.
   for (const RecipeResultRow& line : result.rows) {
     if (line.method != "monte_carlo" || line.free != line.row->free_sets.front()) continue;
     for (const std::string& language : shader_languages()) {
-      OutputFile shader(folder.path(line.row->name + "." + language), true);
-      shader.write(shader_text(find_model(line.row->model), line.fit.values(), &line.fit, language, context.command,
+      folder.write(line.row->name + "." + language,
+                   shader_text(find_model(line.row->model), line.fit.values(), &line.fit, language, context.command,
                                "Constants of row " + line.row->name));
-      shader.commit();
     }
   }
   monitor->check();
@@ -211,12 +208,8 @@ void refit_constants(const fs::path& path, const std::string& output, const Cont
   Json checks = Json::array();
   const bool passed = check_fits(result, context, *monitor, checks);
   document["checks"] = checks;
-  OutputFile page(folder.path("result.md"), true);
-  page.write(result_page(recipe, result, context.command));
-  page.commit();
-  OutputFile json(folder.path("result.json"), true);
-  json.write(document.dump(2) + "\n");
-  json.commit();
+  folder.write("result.md", result_page(recipe, result, context.command));
+  folder.write("result.json", document.dump(2) + "\n");
   folder.commit();
 
   if (context.json) {

@@ -279,12 +279,8 @@ void refit_approximations(const fs::path& path, const std::string& output, const
     passed = passed && checks.back()["passed"].get<bool>();
   }
   document["checks"] = checks;
-  OutputFile page(folder.path("result.md"), true);
-  page.write(result_page(recipe, result, context.command));
-  page.commit();
-  OutputFile json(folder.path("result.json"), true);
-  json.write(document.dump(2) + "\n");
-  json.commit();
+  folder.write("result.md", result_page(recipe, result, context.command));
+  folder.write("result.json", document.dump(2) + "\n");
   folder.commit();
   if (context.json) {
     std::cout << document.dump(2) << "\n";

@@ -380,11 +380,7 @@ void refit_substrate_rules(const fs::path& path, const std::string& output, bool
       {"trees", tree_rows},
       {"conclusion", conclusion},
       {"provenance", provenance}};
-  const auto write = [&](const char* name, const std::string& text) {
-    OutputFile file(folder.path(name), true);
-    file.write(text);
-    file.commit();
-  };
+  const auto write = [&](const char* name, const std::string& text) { folder.write(name, text); };
   write("substrate_rules.json", rules.dump(2) + "\n");
   write("result.json", document.dump(2) + "\n");
   write("result.md", rules_page(recipe, solution, scores, mixes, trees, budget_scores, conclusion, context.command));
