@@ -5,6 +5,7 @@
 
 #include "cli/arguments.h"
 #include "evaluate/float_model.h"
+#include "evaluate/operation_cost.h"
 
 namespace lobefit {
 
@@ -82,7 +83,8 @@ Json model_json(const Model& model) {
             {"square_root", operations.square_root},
             {"transcendental", operations.transcendental},
             {"compare_select", operations.compare_select},
-            {"table_read", operations.table_read}}}};
+            {"table_read", operations.table_read},
+            {"alu_cycles", alu_cycles(operations)}}}};
 }
 
 void print_model(const Model& model) {
@@ -100,10 +102,12 @@ void print_model(const Model& model) {
   if (info.kind == ModelKind::hair_term) fmt::print("  A term of hair: z is the fibre's axis; one number.\n");
   fmt::print(
       "  Cost: {} scalar operations ({} add/multiply, {} divide, {} square root, {} transcendental, {} "
-      "compare/select{})\n",
+      "compare/select{})\n"
+      "        about {} cycles of full-rate arithmetic, if roots and transcendentals run at a quarter of the rate, "
+      "divisions at a fifth, and nothing is fused\n",
       operations.total(), operations.add_multiply, operations.divide, operations.square_root, operations.transcendental,
-      operations.compare_select,
-      operations.table_read > 0 ? fmt::format(", {} table read", operations.table_read) : "");
+      operations.compare_select, operations.table_read > 0 ? fmt::format(", {} table read", operations.table_read) : "",
+      alu_cycles(operations));
   print_parameters(model.parameters);
   print_tiers(model.parameters);
 }

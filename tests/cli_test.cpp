@@ -509,6 +509,28 @@ TEST_F(CommandLine, CheckRefusesDevicesAndLanguagesThatAreNone) {
   expect_refused("check lambert --device vulkan:no_such_device", 6, {"Vulkan"});
 }
 
+TEST_F(CommandLine, CheckTellsWhatStorageCosts) {
+  const Json check = json("check proxima --storage unorm8 --storage albedo=rgb776 --set exponent=0.5");
+  EXPECT_EQ(check["model"], "proxima");
+  EXPECT_EQ(check["parameter_sets"], 16);
+  EXPECT_EQ(check["params"].size(), 5u);
+  EXPECT_EQ(check["worst"], check["params"][0]["name"]);
+  EXPECT_EQ(check["params"][0]["code"], "rgb776");
+  EXPECT_EQ(check["params"][0]["bits"], 20);
+  EXPECT_GT(check["rms"]["log"], 0.0);
+  EXPECT_TRUE(check["passed"]);
+  const Outcome text = run("check slab --storage fp16");
+  EXPECT_EQ(text.code, 0);
+  EXPECT_NE(text.out.find("the worst"), std::string::npos);
+  EXPECT_NE(text.out.find("emissive is beyond fp16's largest number, 65504"), std::string::npos) << text.out;
+  EXPECT_EQ(run("check lambert --storage unorm8 --set albedo=1 --tolerance 0").code, 0);
+  EXPECT_EQ(run("check lambert --storage unorm8 --tolerance 1e-9").code, 5);
+  expect_refused("check lambert --storage fp15", 2, {"'fp15'", "fp16"});
+  expect_refused("check lambert --storage albdo=fp16", 2, {"'albdo'", "albedo"});
+  expect_refused("check lambert --storage fp16 --device simd", 2, {"--storage"});
+  expect_refused("check lambert --tolerance 1", 2, {"--storage"});
+}
+
 TEST_F(CommandLine, CheckRunsShadersOnVulkanDevices) {
   const Json devices = json("check --list-devices")["devices"];
   if (devices.size() < 2) GTEST_SKIP() << "no Vulkan device, or no Vulkan in this build";
