@@ -90,7 +90,7 @@ HtmlTable errors_table(const std::vector<JsonReader>& lines) {
 }
 
 std::string domain_text(const JsonReader& line) {
-  std::string text = "`" + line.at("formula").text() + "` for " + line.at("reference").at("name").text() + ", over ";
+  std::string text = line.at("formula").text() + " for " + line.at("reference").at("name").text() + ", over ";
   std::string axes;
   for (const auto& [name, axis] : line.at("domain").members()) {
     if (!axis.value().is_object()) continue;

@@ -17,6 +17,9 @@ namespace {
 /// Bytes of packed values on a page, all tables together.
 constexpr std::size_t most_value_bytes = 2'000'000;
 
+/// A conclusion of more bytes would push everything else off the first screen.
+constexpr std::size_t longest_open_conclusion = 1000;
+
 std::string escaped(std::string_view text) {
   std::string result;
   for (const char c : text) {
@@ -254,7 +257,12 @@ Json explorer_json(const HtmlExplorer& explorer) {
 std::string lead_html(const HtmlReport& report) {
   std::string html;
   if (!report.description.empty()) html += "<p>" + escaped(report.description) + "</p>\n";
-  if (!report.conclusion.empty()) html += "<p class=\"conclusion\">" + escaped(report.conclusion) + "</p>\n";
+  const std::string conclusion = "<p class=\"conclusion\">" + escaped(report.conclusion) + "</p>\n";
+  if (report.conclusion.size() > longest_open_conclusion) {
+    html += "<details><summary>Conclusion</summary>\n" + conclusion + "</details>\n";
+  } else if (!report.conclusion.empty()) {
+    html += conclusion;
+  }
   if (!report.command.empty())
     html += "<p class=\"command\">Made by <code>" + escaped(report.command) + "</code></p>\n";
   return html;

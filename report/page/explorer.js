@@ -171,7 +171,7 @@ const explorerPanel = {
 
   makeControls() {
     const { parameters, spheres, model } = this.explorer;
-    const group = (legend, controls) => make('fieldset', {}, make('legend', {}, legend), ...controls);
+    const group = (legend, controls) => make('fieldset', {}, make('legend', {}, legend), make('div', { class: 'sliders' }, ...controls));
     const everySphere = spheres.map((_, sphere) => sphere);
     const shared = parameters.flatMap((p, k) => p.apart && spheres.length > 1 ? [] : this.control(p, k, everySphere));
     const groups = shared.length ? [group(spheres.length > 1 ? 'All spheres' : model, shared)] : [];
