@@ -43,6 +43,7 @@ void add_table_compare(CLI::App& tables, Context& context);
 void add_sphere(CLI::App& app, Context& context);
 void add_fit(CLI::App& app, Context& context);
 void add_refit(CLI::App& app, Context& context);
+void add_report(CLI::App& app, Context& context);
 void add_check(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_plot(CLI::App& app, Context& context);

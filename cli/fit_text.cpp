@@ -54,4 +54,11 @@ std::string tiers_text(const std::vector<TierFit>& tiers) {
   return text;
 }
 
+std::string interval_text(const FitParameter& p) {
+  if (!p.estimate.identifiable) return "not identifiable";
+  if (p.estimate.at_bound) return fmt::format("{:.4g}, at its bound", p.estimate.value);
+  if (p.estimate.standard_error == 0.0) return fmt::format("{:.5f}", p.estimate.value);
+  return fmt::format("{:.5f} [{:.5f}, {:.5f}]", p.estimate.value, p.estimate.ci_low, p.estimate.ci_high);
+}
+
 }  // namespace lobefit

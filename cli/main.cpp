@@ -96,6 +96,7 @@ int run(int argc, char** argv) {
   add_table(app, context);
   add_fit(app, context);
   add_refit(app, context);
+  add_report(app, context);
   add_check(app, context);
   add_export(app, context);
   add_plot(app, context);

@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "cli/constants_page.h"
+#include "cli/fit_text.h"
 #include "cli/output_folder.h"
 #include "cli/refit_approximations.h"
 #include "cli/refit_curves.h"
@@ -53,13 +54,6 @@ std::string stem(const RecipeResultRow& line) {
   std::string free;
   for (const std::string& name : line.free) free += "-" + name;
   return line.row->name + "." + line.method + free;
-}
-
-std::string interval_text(const FitParameter& p) {
-  if (!p.estimate.identifiable) return "not identifiable";
-  if (p.estimate.at_bound) return fmt::format("{:.4g}, at its bound", p.estimate.value);
-  if (p.estimate.standard_error == 0.0) return fmt::format("{:.5f}", p.estimate.value);
-  return fmt::format("{:.5f} [{:.5f}, {:.5f}]", p.estimate.value, p.estimate.ci_low, p.estimate.ci_high);
 }
 
 /// The result as a Markdown page.

@@ -150,8 +150,9 @@ void print_result(const ApproximationResult& result) {
 
 /// "θ_d, degrees", "cos θ", "α"; gnuplot sets what follows _ below the line.
 std::string axis_label(const DomainAxis& axis) {
-  std::string label = axis.degrees ? axis.argument.substr(4) : axis.argument;
-  if (!axis.degrees && (label.starts_with("cos_") || label.starts_with("sin_"))) label[3] = ' ';
+  const bool prefixed = axis.argument.starts_with("cos_") || axis.argument.starts_with("sin_");
+  std::string label = !axis.degrees ? axis.argument : prefixed ? axis.argument.substr(4) : "theta";
+  if (!axis.degrees && prefixed) label[3] = ' ';
   for (const auto& [name, letter] : {std::pair("theta", "θ"), std::pair("phi", "φ"), std::pair("alpha", "α")}) {
     if (const std::size_t at = label.find(name); at != std::string::npos) {
       label.replace(at, std::string_view(name).size(), letter);

@@ -568,6 +568,7 @@ Json ApproximationResult::json(const ApproximationRecipe& recipe, const std::str
               {"max", largest},
               {"readings", readings},
               {"identifiable", identifiable}};
+    if (!row.each.empty()) line["each"] = row.each;
     if (fit.integral) {
       line["integral"] = {{"over", row.integral},
                           {"target", fit.integral->target},
@@ -577,6 +578,8 @@ Json ApproximationResult::json(const ApproximationRecipe& recipe, const std::str
     rows.push_back(std::move(line));
   }
   return {{"recipe", recipe.name},
+          {"title", recipe.title},
+          {"description", recipe.description},
           {"rows", rows},
           {"conclusion", conclusion},
           {"provenance", {{"version", LOBEFIT_VERSION}, {"command", command}}}};

@@ -315,6 +315,7 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
                              .method = method,
                              .table = static_cast<std::size_t>(known - result.tables.begin()),
                              .free = free,
+                             .published = published,
                              .fit = fit(model, published, table, options, monitor),
                              .rms_published = rms_difference(table, published_values, row.quantity, weights),
                              .published_values = published_values,
@@ -336,7 +337,11 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
     const Json reference = reference_json(row.reference, row.reference_values);
     Json axes = Json::object();
     for (const Axis& axis : recipe.parameter_axes) axes[axis.name] = axis.values;
-    Json parameters = Json::object(), fixed = Json::object();
+    Json parameters = Json::object(), fixed = Json::object(), started = Json::object();
+    for (const std::string& name : line.free) {
+      const std::span<const double> value = line.published.components(line.published.info(name));
+      started[name] = value.size() == 1 ? Json(value[0]) : Json(std::vector(value.begin(), value.end()));
+    }
     for (const FitParameter& p : line.fit.parameters) {
       if (!p.free) {
         fixed[p.name] = p.estimate.value;
@@ -366,6 +371,7 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
                      {"method", line.method},
                      {"free", line.free},
                      {"fixed", fixed},
+                     {"published", started},
                      {"params", parameters},
                      {"rms", rms},
                      {"identifiable", line.fit.solution.identifiable},
@@ -376,6 +382,7 @@ Json RecipeResult::json(const Recipe& recipe, const std::string& command, std::u
   for (const auto& [name, value] : recipe.published) published[name] = value;
   return {{"recipe", recipe.name},
           {"title", recipe.title},
+          {"description", recipe.description},
           {"published", published},
           {"rows", lines},
           {"conclusion", conclusion},

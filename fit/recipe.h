@@ -75,6 +75,7 @@ struct RecipeResultRow {
   std::string method;  // "monte_carlo" or "exact"
   std::size_t table;   // in RecipeResult::tables
   std::vector<std::string> free;
+  ParameterValues published;  // where the fit starts
   Fit fit;
   double rms_published = 0.0, rms_refit = 0.0;
   std::vector<float> published_values, refit_values;  // over the row's table

@@ -737,7 +737,7 @@ TEST_F(CommandLine, ModelsDescribeThemselves) {
     }
   }
   for (const char* verb : {"models", "eval", "albedo", "references", "reference", "render", "table", "fit", "refit",
-                           "check", "export", "plot", "sphere"}) {
+                           "report", "check", "export", "plot", "sphere"}) {
     const Outcome help = run(std::string(verb) + " --help");
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find(verb), std::string::npos);

@@ -1,0 +1,101 @@
+#include "cli/report_folder.h"
+
+#include <algorithm>
+
+#include "evaluate/shader.h"
+#include "reference/output_file.h"
+
+namespace lobefit {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+/// Bytes of figures on a page, as their files have them.
+constexpr std::size_t most_figure_bytes = 1'000'000;
+
+bool is_there(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+}  // namespace
+
+std::shared_ptr<const Table> FolderTables::find(const std::string& sha256) {
+  if (!std::exchange(listed_, true)) {
+    for (const auto& file : fs::directory_iterator(folder_)) {
+      if (file.path().extension() == ".exr") paths_.emplace(sha256_of_file(file.path()), file.path());
+    }
+  }
+  const auto path = paths_.find(sha256);
+  if (path == paths_.end()) return nullptr;
+  std::shared_ptr<const Table>& table = tables_[sha256];
+  if (!table) table = std::make_shared<const Table>(Table::read(path->second));
+  return table;
+}
+
+void FolderFigures::add(const std::string& stem, std::vector<HtmlFigure>& figures) {
+  std::optional<HtmlFigure> smallest;
+  for (const auto& [extension, type] : {std::pair(".svg", "image/svg+xml"), std::pair(".png", "image/png")}) {
+    const fs::path path = folder_ / (stem + extension);
+    if (!is_there(path)) continue;
+    HtmlFigure figure{.title = stem, .media_type = type, .content = read_file(path)};
+    if (!smallest || figure.content.size() < smallest->content.size()) smallest = std::move(figure);
+  }
+  if (!smallest) return;
+  if (bytes_ + smallest->content.size() > most_figure_bytes) {
+    left_out_.push_back(stem);
+    return;
+  }
+  bytes_ += smallest->content.size();
+  figures.push_back(std::move(*smallest));
+}
+
+void FolderFigures::add_remark(std::vector<std::string>& remarks) const {
+  if (left_out_.empty()) return;
+  remarks.push_back("To keep the page small, it leaves out the figures " + joined(left_out_) +
+                    "; they lie in the folder.");
+}
+
+std::vector<HtmlShader> folder_shaders(const fs::path& folder, const std::string& stem) {
+  std::vector<HtmlShader> shaders;
+  for (const std::string& language : shader_languages()) {
+    const fs::path path = folder / (stem + "." + language);
+    if (is_there(path)) shaders.push_back({language, read_file(path)});
+  }
+  return shaders;
+}
+
+std::optional<FolderFit> folder_fit(const fs::path& path) {
+  if (!is_there(path)) return std::nullopt;
+  const Json json = parse_json(read_file(path), path.string());
+  return FolderFit{Fit::from_json(json, path.string()),
+                   JsonReader(json, path.string()).at("provenance").at("table_sha256").text()};
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+std::vector<std::string> texts(const JsonReader& list) {
+  std::vector<std::string> result;
+  for (const JsonReader& element : list.elements()) result.push_back(element.text());
+  return result;
+}
+
+HtmlReport report_head(const JsonReader& result) {
+  const JsonReader provenance = result.at("provenance");
+  // Results of older versions state neither title nor description.
+  HtmlReport report{.title = result.has("title") ? result.at("title").text() : result.at("recipe").text(),
+                    .description = result.has("description") ? result.at("description").text() : "",
+                    .conclusion = result.at("conclusion").text(),
+                    .command = provenance.at("command").text()};
+  for (const auto& [name, member] : provenance.members()) {
+    report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
+  }
+  return report;
+}
+
+}  // namespace lobefit

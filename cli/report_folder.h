@@ -1,0 +1,69 @@
+// Folders of results as lobefit writes them, read back for a page.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fit/fit.h"
+#include "reference/json_reader.h"
+#include "report/html_report.h"
+
+namespace lobefit {
+
+/// Tables of a folder by what they hold, each read once.
+class FolderTables {
+ public:
+  explicit FolderTables(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  /// Null if the folder has none of this SHA-256. Throws Error(invalid_input) for a file that is no table.
+  std::shared_ptr<const Table> find(const std::string& sha256);
+
+ private:
+  std::filesystem::path folder_;
+  std::map<std::string, std::filesystem::path> paths_;  // by SHA-256
+  std::map<std::string, std::shared_ptr<const Table>> tables_;
+  bool listed_ = false;
+};
+
+/// Figures of a folder, as far as a page has room.
+class FolderFigures {
+ public:
+  explicit FolderFigures(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  /// Adds STEM.svg or STEM.png, the smaller, if there is one.
+  void add(const std::string& stem, std::vector<HtmlFigure>& figures);
+  /// One remark on what had no room, if any.
+  void add_remark(std::vector<std::string>& remarks) const;
+
+ private:
+  std::filesystem::path folder_;
+  std::size_t bytes_ = 0;
+  std::vector<std::string> left_out_;
+};
+
+/// STEM.LANGUAGE of every shader language that the folder has.
+std::vector<HtmlShader> folder_shaders(const std::filesystem::path& folder, const std::string& stem);
+
+/// A fit's file with the table that it was made on; nothing if the folder lacks the file. Throws Error(invalid_input).
+struct FolderFit {
+  Fit fit;
+  std::string table_sha256;
+};
+std::optional<FolderFit> folder_fit(const std::filesystem::path& path);
+
+/// "a, b"
+std::string joined(const std::vector<std::string>& names);
+std::vector<std::string> texts(const JsonReader& list);
+/// Title, conclusion, provenance: what all results have in common.
+HtmlReport report_head(const JsonReader& result);
+
+/// Of `refit` with recipes of constants: tables, fits and shaders in the folder are used where they are.
+HtmlReport constants_report(const std::filesystem::path& folder, const JsonReader& result);
+/// Of `refit` with recipes of closed forms.
+HtmlReport forms_report(const std::filesystem::path& folder, const JsonReader& result);
+/// Of `fit` over several materials, by its summary.json.
+HtmlReport materials_report(const std::filesystem::path& folder, const JsonReader& summary, const std::string& command);
+
+}  // namespace lobefit

@@ -1,0 +1,113 @@
+// The page of fits to several materials: how well each is met, its parameters, and its sphere.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "cli/report_folder.h"
+#include "cli/shader_text.h"
+#include "evaluate/shader.h"
+#include "reference/output_file.h"
+
+namespace lobefit {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Pages of more materials have their shaders in GLSL alone, which the spheres need.
+constexpr std::size_t most_with_all_languages = 8;
+
+/// A number or "–".
+std::string metric_text(const JsonReader& metrics, const std::string& name) {
+  return metrics.has(name) ? fmt::format("{:.5f}", metrics.at(name).number()) : "–";
+}
+
+HtmlTable errors_table(const JsonReader& summary) {
+  HtmlTable table{.caption = "Errors", .header = {"material", "state"}};
+  std::vector<std::string> metrics, held_out;
+  const std::vector<JsonReader> fits = summary.at("fits").elements();
+  for (const auto& [name, value] : fits.front().at("metrics").members()) metrics.push_back(name);
+  for (const auto& [name, value] : fits.front().at("holdout").members()) held_out.push_back(name);
+  for (const std::string& name : metrics) table.header.push_back("rms " + name);
+  for (const std::string& name : held_out) table.header.push_back("held-out rms " + name);
+  for (const JsonReader& fit : fits) {
+    std::vector<std::string> cells{fit.at("material").text(),
+                                   fit.at("converged").boolean() ? "converged" : "not converged"};
+    for (const std::string& name : metrics) cells.push_back(metric_text(fit.at("metrics"), name));
+    for (const std::string& name : held_out) cells.push_back(metric_text(fit.at("holdout"), name));
+    table.lines.push_back(std::move(cells));
+  }
+  for (const JsonReader& failure : summary.at("failures").elements()) {
+    table.lines.push_back({failure.at("material").text(), "failed: " + failure.at("message").text()});
+    table.lines.back().resize(table.header.size());
+  }
+  return table;
+}
+
+HtmlTable spread_table(const JsonReader& summary) {
+  HtmlTable table{.caption = "Errors over all materials", .header = {"rms", "median", "95th percentile", "worst"}};
+  for (const auto& [name, spread] : summary.at("quantiles").members()) {
+    table.lines.push_back(
+        {name, metric_text(spread, "median"), metric_text(spread, "p95"), metric_text(spread, "worst")});
+  }
+  return table;
+}
+
+HtmlTable parameters_table(const Fit& fit) {
+  HtmlTable table{.caption = "Parameters", .header = {"parameter", "value", "95 % interval", "range", "remark"}};
+  for (const FitParameter& p : fit.parameters) {
+    const bool interval = p.free && p.estimate.identifiable && !p.estimate.at_bound && p.estimate.standard_error > 0.0;
+    table.lines.push_back({p.name, fmt::format("{:.6g}", p.estimate.value),
+                           interval ? fmt::format("[{:.6g}, {:.6g}]", p.estimate.ci_low, p.estimate.ci_high) : "–",
+                           fmt::format("{:g} … {:g}", p.lower, p.upper),
+                           !p.free                    ? "held"
+                           : !p.estimate.identifiable ? "not identifiable"
+                           : p.estimate.at_bound      ? "at its bound"
+                                                      : ""});
+  }
+  return table;
+}
+
+}  // namespace
+
+HtmlReport materials_report(const fs::path& folder, const JsonReader& summary, const std::string& command) {
+  const JsonReader provenance = summary.at("provenance");
+  const std::string model_name = summary.at("model").text();
+  const std::vector<JsonReader> fits = summary.at("fits").elements();
+  if (fits.empty()) throw summary.at("fits").error("no material was fitted", "see its failures");
+  HtmlReport report{.title = fmt::format("{} fitted to {} materials", model_name, fits.size()),
+                    .command = provenance.at("command").text()};
+  report.tables = {errors_table(summary), spread_table(summary)};
+  for (const auto& [name, member] : provenance.members())
+    report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
+
+  FolderFigures figures(folder);
+  const bool all_languages = fits.size() <= most_with_all_languages;
+  for (const JsonReader& line : fits) {
+    const std::string material = line.at("material").text();
+    HtmlRow row{.name = material};
+    if (const std::optional<FolderFit> found = folder_fit(folder / line.at("fit").text())) {
+      const Model& model = find_model(found->fit.model);
+      const ParameterValues values = found->fit.values();
+      row.note = fmt::format("{}; measured data with SHA-256 {}.", model.info->title, found->table_sha256);
+      row.tables = {parameters_table(found->fit)};
+      for (const std::string& language : shader_languages()) {
+        if (!all_languages && language != "glsl") continue;
+        row.shaders.push_back(
+            {language, shader_text(model, values, &found->fit, language, command, "Fitted constants of " + material)});
+      }
+      if (model.info->kind == ModelKind::brdf && !model.info->transmits)
+        row.explorer = {.model = &model, .spheres = {{"fitted", {values.flat().begin(), values.flat().end()}}}};
+    } else {
+      report.remarks.push_back("The folder lacks " + line.at("fit").text() + ".");
+    }
+    figures.add(material, row.figures);
+    report.rows.push_back(std::move(row));
+  }
+  if (!all_languages)
+    report.remarks.push_back("`lobefit export FIT.json` writes shaders in other languages than GLSL.");
+  figures.add_remark(report.remarks);
+  return report;
+}
+
+}  // namespace lobefit
