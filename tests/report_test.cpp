@@ -328,6 +328,7 @@ TEST_F(ReportOfFolder, HoldsTheResult) {
   for (const char* file : {"all.glsl", "all.hlsl", "slice.wgsl", "slice.c"})
     EXPECT_TRUE(contains(text, "<code>" + read_file(folder_ / "result" / file) + "</code>")) << file;
   EXPECT_TRUE(contains(page, "src=\"data:image/"));
+  EXPECT_TRUE(contains(page, "3 of 3 checks passed"));
 }
 
 /// The slices' lines against the reference give the result's own rms.
