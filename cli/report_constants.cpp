@@ -47,17 +47,31 @@ FitParameter found(const std::string& name, const JsonReader& json) {
           .free = true};
 }
 
+/// The published constants, then what else any row frees.
+std::vector<std::string> constant_names(const JsonReader& result) {
+  std::vector<std::string> names;
+  const auto add = [&](const JsonReader& object) {
+    for (const auto& [name, value] : object.members()) {
+      if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+    }
+  };
+  add(result.at("published"));
+  for (const JsonReader& line : result.at("rows").elements()) add(line.at("params"));
+  return names;
+}
+
 HtmlTable constants_table(const JsonReader& result) {
-  HtmlTable table{.caption = "Constants", .header = {"row", "method", "free"}};
-  table.lines.push_back({"published", "", ""});
-  for (const auto& [name, value] : result.at("published").members()) {
+  HtmlTable table{.caption = "Constants", .header = {"row", "method", "free"}, .lines = {{"published", "", ""}}};
+  const std::vector<std::string> names = constant_names(result);
+  const JsonReader published = result.at("published");
+  for (const std::string& name : names) {
     table.header.push_back(name);
-    table.lines.front().push_back(fmt::format("{:g}", value.number()));
+    table.lines.front().push_back(published.has(name) ? fmt::format("{:g}", published.at(name).number()) : "");
   }
   for (const JsonReader& line : result.at("rows").elements()) {
     std::vector<std::string> cells{line.at("name").text(), line.at("method").text(), joined(texts(line.at("free")))};
-    for (const auto& [name, value] : result.at("published").members()) {
-      const JsonReader params = line.at("params"), fixed = line.at("fixed");
+    const JsonReader params = line.at("params"), fixed = line.at("fixed");
+    for (const std::string& name : names) {
       cells.push_back(params.has(name)  ? interval_text(found(name, params.at(name)))
                       : fixed.has(name) ? fmt::format("({:g})", fixed.at(name).number())
                                         : "");
@@ -82,7 +96,10 @@ HtmlTable errors_table(const JsonReader& result) {
       cells.push_back(fmt::format("{:.5f}", rms.at(table.header[k]).number()));
     table.lines.push_back(std::move(cells));
   }
-  table.note = "rms over the row's domain, in its metric and with its weights: cosine is π f cos θi, brdf is π f.";
+  table.note =
+      "rms over the row's domain, in its metric and with its weights: cosine is π f cos θi, brdf π f, log log(1 + f "
+      "cos "
+      "θi), cube_root (f cos θi)^⅓.";
   return table;
 }
 

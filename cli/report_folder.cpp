@@ -95,6 +95,15 @@ HtmlReport report_head(const JsonReader& result) {
   for (const auto& [name, member] : provenance.members()) {
     report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
   }
+  if (result.has("checks")) {
+    // Of constants the check stands beside what it is of; of forms the two are one.
+    const std::vector<JsonReader> checks = result.at("checks").elements();
+    const auto passed = std::ranges::count_if(checks, [](const JsonReader& check) {
+      return (check.has("check") ? check.at("check") : check).at("passed").boolean();
+    });
+    report.provenance.emplace_back("float against double",
+                                   std::to_string(passed) + " of " + std::to_string(checks.size()) + " checks passed");
+  }
   return report;
 }
 

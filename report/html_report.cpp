@@ -16,6 +16,8 @@ namespace {
 
 /// Bytes of packed values on a page, all tables together.
 constexpr std::size_t most_value_bytes = 2'000'000;
+/// Of one array: tables below that keep all of their parameter rows.
+constexpr std::size_t small_array_bytes = 20'000;
 
 /// A conclusion of more bytes would push everything else off the first screen.
 constexpr std::size_t longest_open_conclusion = 1000;
@@ -144,6 +146,7 @@ class PackedTables {
     for (const HtmlRow& row : rows) {
       if (!row.slices.reference) continue;
       const std::size_t one = bytes_of(*row.slices.reference);
+      if (one <= small_array_bytes) continue;
       if (!std::exchange(counted[row.slices.reference.get()], true)) bytes += one;
       bytes += one * row.slices.lines.size();
     }
@@ -190,8 +193,9 @@ class PackedTables {
   /// Evenly spread, both ends included.
   std::vector<std::size_t> kept_rows(const Table& table) {
     const std::size_t all = table.parameter_rows();
+    const double share = bytes_of(table) <= small_array_bytes ? 1.0 : share_;
     const auto kept =
-        std::clamp(static_cast<std::size_t>(share_ * static_cast<double>(all)), std::min<std::size_t>(all, 2), all);
+        std::clamp(static_cast<std::size_t>(share * static_cast<double>(all)), std::min<std::size_t>(all, 2), all);
     left_out_ = left_out_ || kept < all;
     std::vector<std::size_t> rows;
     for (std::size_t k = 0; k < kept; ++k) rows.push_back(kept == 1 ? 0 : k * (all - 1) / (kept - 1));

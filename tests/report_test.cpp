@@ -262,12 +262,12 @@ class ReportOfFolder : public ::testing::Test {
     fs::create_directories(folder_);
     std::ofstream(folder_ / "recipe.json") << R"({
       "recipe": "small", "title": "Is 2 < 3 & </script> safe?", "description": "A recipe of the tests.",
-      "model": "proxima", "fixed": {"albedo": 1}, "published": {"a": -0.55, "b": 0.19},
+      "model": "proxima", "fixed": {"albedo": 0.6}, "published": {"a": -0.55, "b": 0.19},
       "axes": {"alpha": [0.25, 0.5, 1.0]}, "samples": 256, "tolerance": 0.01,
       "rivals": [{"model": "lambert"}],
       "rows": [
-        {"name": "all", "views": "all", "reference": {"name": "microfacet_diffuse", "set": {"masking": "area_mean"}},
-         "grid": "small", "metric": "cosine", "weights": "uniform", "free": [["a", "b"], ["a"]]},
+        {"name": "all", "views": "all", "reference": {"name": "microfacet_diffuse", "set": {"masking": "area_mean", "albedo": 0.6}},
+         "grid": "small", "metric": "cosine", "weights": "uniform", "free": [["a", "b"], ["albedo", "a"]]},
         {"name": "slice", "views": "normal_slice", "reference": {"name": "microfacet_diffuse"},
          "grid": {"theta_i": [0, 20, 40, 60, 80], "theta_o": [0], "phi": [0]},
          "metric": "brdf", "weights": "sin_theta_i", "free": [["a", "b"]]}]})";
@@ -328,6 +328,7 @@ TEST_F(ReportOfFolder, HoldsTheResult) {
   for (const char* file : {"all.glsl", "all.hlsl", "slice.wgsl", "slice.c"})
     EXPECT_TRUE(contains(text, "<code>" + read_file(folder_ / "result" / file) + "</code>")) << file;
   EXPECT_TRUE(contains(page, "src=\"data:image/"));
+  EXPECT_TRUE(contains(page, "3 of 3 checks passed"));
 }
 
 /// The slices' lines against the reference give the result's own rms.
@@ -364,7 +365,7 @@ TEST_F(ReportOfFolder, SlicesHaveTheResultsErrors) {
   // Two free sets of "all", each with the published line too; "slice" has one.
   EXPECT_EQ(compared, 6u);
   const Json& explorer = data.at("rows").at(0).at("explorer");
-  EXPECT_EQ(explorer.at("spheres"), Json({"published", "refit a, b", "refit a"}));
+  EXPECT_EQ(explorer.at("spheres"), Json({"published", "refit a, b", "refit albedo, a"}));
   for (const Json& parameter : explorer.at("parameters")) {
     const Json& values = parameter.at("values");
     if (parameter.at("name") == "a") {

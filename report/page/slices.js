@@ -213,7 +213,8 @@ const slicePanel = {
 
   readOut(lines) {
     const slices = this.slices, place = { ...this.place(), thetaI: this.marker };
-    byId('marker-value').textContent = `At θᵢ = ${tickText(slices.theta_i[this.marker])}°`;
+    byId('marker-value').textContent = `At θᵢ = ${tickText(slices.theta_i[this.marker])}°` +
+        (byId('drawing').value === 'polar' ? '; the chosen azimuth is on the right, the opposite one on the left' : '');
     byId('readout').replaceChildren(...lines.map((values, line) => {
       const swatch = make('span', { class: 'swatch' });
       swatch.style.borderTopColor = lineColour(line);
