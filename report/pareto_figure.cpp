@@ -101,15 +101,29 @@ std::string pareto_figure(const std::vector<ParetoPanel>& panels, const std::str
       const double x = across_panel(point), y = down_panel(point);
       taken.push_back({x - 5.0, y - 5.0, x + 5.0, y + 5.0});
     }
+    std::vector<Box> line;  // the front, in small pieces
+    for (std::size_t f = 1; f < front.size(); ++f) {
+      const ParetoPoint &from = points[front[f - 1]], &to = points[front[f]];
+      constexpr int pieces = 100;
+      for (int piece = 0; piece <= pieces; ++piece) {
+        const double x = std::lerp(across_panel(from), across_panel(to), piece / double{pieces});
+        const double y = std::lerp(down_panel(from), down_panel(to), piece / double{pieces});
+        line.push_back({x - 2.0, y - 2.0, x + 2.0, y + 2.0});
+      }
+    }
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double x = across_panel(points[i]), y = down_panel(points[i]);
       const double width = character_width * label_size * static_cast<double>(length(points[i].label));
-      const auto is_free = [&](const Place& place) {
+      const auto is_free = [&](const Place& place, bool over_line) {
         const Box box = box_of(place, x, y, width);
         return box.left >= 2.0 && box.right <= panel_width + 12.0 && box.top >= 0.0 && box.bottom <= panel_height &&
-               std::ranges::none_of(taken, [&](const Box& other) { return box.meets(other); });
+               std::ranges::none_of(taken, [&](const Box& other) { return box.meets(other); }) &&
+               (over_line || std::ranges::none_of(line, [&](const Box& other) { return box.meets(other); }));
       };
-      const auto found = std::ranges::find_if(places, is_free);
+      auto found = std::ranges::find_if(places, [&](const Place& place) { return is_free(place, false); });
+      if (found == places.end()) {
+        found = std::ranges::find_if(places, [&](const Place& place) { return is_free(place, true); });
+      }
       const Place& place = found == places.end() ? places[0] : *found;
       taken.push_back(box_of(place, x, y, width));
       const bool best = std::ranges::find(front, i) != front.end();
