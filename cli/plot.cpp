@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/arguments.h"
+#include "cli/plot_pareto.h"
 #include "cli/sampling.h"
 #include "cli/slice.h"
 #include "reference/output_file.h"
@@ -81,7 +82,8 @@ void add_plot(CLI::App& app, Context& context) {
       "Figures as SVG or PNG\n"
       "  lobefit plot slices truth.exr --with proxima --with fit.json --with chan_2024 -o slices.svg\n"
       "  lobefit plot residuals truth.exr --with proxima --with eon:roughness=0.4*alpha^0.5 --phi 180 -o maps.png\n"
-      "  lobefit plot slices microfacet_diffuse --axis alpha=0.1,0.5,1 --with proxima -o slices.png");
+      "  lobefit plot slices microfacet_diffuse --axis alpha=0.1,0.5,1 --with proxima -o slices.png\n"
+      "  lobefit plot pareto -o pareto.svg");
   verb->require_subcommand(1);
   const auto add = [&](const char* name, const char* description, auto figure, auto suitable_size) {
     CLI::App* kind = verb->add_subcommand(name, description);
@@ -129,6 +131,7 @@ void add_plot(CLI::App& app, Context& context) {
         return residual_figure(t, m, c, title);
       },
       [](const Table& t, std::size_t models, const SliceChoice& c) { return residual_figure_size(t, models, c); });
+  add_plot_pareto(*verb, context);
 }
 
 }  // namespace lobefit

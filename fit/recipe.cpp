@@ -109,33 +109,6 @@ RecipeRow read_row(const JsonReader& reader, const ParameterValues& recipe_value
   return row;
 }
 
-/// A rival over the table, refitted per parameter row where the recipe says so.
-RivalScore score(const Rival& rival, const Table& table, const RecipeRow& row, const std::vector<double>& weights,
-                 Monitor& monitor) {
-  const Model& model = find_model(rival.model);
-  ParameterValues values = with_table_parameters(model.defaults(), table);
-  for (const auto& [name, components] : rival.set) values.set(name, components);
-  RivalScore result{.label = rival.label};
-  if (rival.free_per_row.empty()) {
-    result.values = TableModel(model, values, table, rival.mappings).render().values;
-  } else {
-    result.values.resize(table.values.size());
-    const std::size_t per_row = table.entries() / table.parameter_rows();
-    for (std::size_t r = 0; r < table.parameter_rows(); ++r) {
-      const Table slice = table.row_slice(r);
-      const FitOptions options{.free = rival.free_per_row, .quantity = row.quantity, .weights = row.weights};
-      const std::vector<float> part =
-          TableModel(model, fit(model, values, slice, options, monitor).values(), slice).render().values;
-      for (std::size_t c = 0; c < static_cast<std::size_t>(table.channels); ++c) {
-        std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(c * per_row), per_row,
-                    result.values.begin() + static_cast<std::ptrdiff_t>(c * table.entries() + r * per_row));
-      }
-    }
-  }
-  result.rms = rms_difference(table, result.values, row.quantity, weights);
-  return result;
-}
-
 std::string constants_text(const RecipeResultRow& row, const Recipe& recipe) {
   std::string text;
   for (const FitParameter& p : row.fit.parameters) {
@@ -308,7 +281,7 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
       for (const auto& [name, value] : row.fixed) published.set(name, value);
       const std::vector<float> published_values = TableModel(model, published, table).render().values;
       std::vector<RivalScore> rivals;
-      for (const Rival& rival : recipe.rivals) rivals.push_back(score(rival, table, row, weights, monitor));
+      for (const Rival& rival : recipe.rivals) rivals.push_back(score(rival, table, row.quantity, row.weights, monitor));
       for (const std::vector<std::string>& free : row.free_sets) {
         const FitOptions options{.free = free, .quantity = row.quantity, .weights = row.weights, .seed = seed};
         RecipeResultRow line{.row = &row,

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/fit.h"
+#include "fit/rival.h"
 #include "reference/render.h"
 
 namespace lobefit {
@@ -22,15 +22,6 @@ inline constexpr std::array<std::string_view, 4> recipe_kind_names{"constants", 
                                                                    "approximations"};
 /// What a recipe's "kind" says; without one it is of constants. Throws Error(invalid_input).
 RecipeKind recipe_kind(const std::filesystem::path& path);
-
-/// Another model scored on a row's table: as it is, or with one set of its parameters refitted per parameter row.
-struct Rival {
-  std::string label;
-  std::string model;
-  std::vector<std::pair<std::string, std::vector<double>>> set;
-  std::vector<AxisMapping> mappings;
-  std::vector<std::string> free_per_row;
-};
 
 struct RecipeRow {
   std::string name;
@@ -61,12 +52,6 @@ struct Recipe {
 
   /// Throws Error(invalid_input) with the JSON path.
   static Recipe read(const std::filesystem::path& path);
-};
-
-struct RivalScore {
-  std::string label;
-  double rms;
-  std::vector<float> values;  // the rival over the row's table
 };
 
 /// One line of the result: a row, a method and a set of free parameters.

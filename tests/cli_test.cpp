@@ -531,6 +531,13 @@ TEST_F(CommandLine, CheckTellsWhatStorageCosts) {
   expect_refused("check lambert --tolerance 1", 2, {"--storage"});
 }
 
+TEST_F(CommandLine, ParetoRefusesBeforeItWorks) {
+  expect_refused("plot pareto -o pareto.txt", 2, {"--output", ".svg"});
+  expect_refused("plot pareto --samples 0", 2, {"--samples"});
+  std::ofstream(folder_ / "pareto.svg") << "mine";
+  expect_refused("plot pareto -o pareto.svg", 2, {"pareto.svg", "--force"});
+}
+
 TEST_F(CommandLine, CheckRunsShadersOnVulkanDevices) {
   const Json devices = json("check --list-devices")["devices"];
   if (devices.size() < 2) GTEST_SKIP() << "no Vulkan device, or no Vulkan in this build";

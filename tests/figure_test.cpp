@@ -18,6 +18,7 @@
 #include "models/error.h"
 #include "reference/output_file.h"
 #include "report/material_figure.h"
+#include "report/pareto_figure.h"
 
 namespace lobefit {
 
@@ -381,6 +382,22 @@ TEST_F(WriteFigure, SuggestsSizesThatFitThePanels) {
   const fs::path path = folder / "a.svg";
   write_figure(slice_figure(reference, models, {}, ""), path, true, slice_figure_size(reference, {}));
   write_figure(residual_figure(reference, models, {}, ""), path, true, residual_figure_size(reference, 5, {}));
+}
+
+TEST(ParetoFigure, FrontHoldsWhatNothingBeats) {
+  const std::vector<ParetoPoint> points{{"cheap", 1, 9}, {"beaten", 6, 5},  {"middle", 5, 4}, {"twin", 5, 4},
+                                        {"best", 9, 1},  {"as dear", 9, 2}, {"as far", 7, 4}};
+  EXPECT_EQ(pareto_front(points), (std::vector<std::size_t>{0, 2, 3, 4}));
+  EXPECT_EQ(pareto_front({}), std::vector<std::size_t>{});
+}
+
+TEST(ParetoFigure, HoldsItsNumbersAndNamesEveryPoint) {
+  const std::vector<ParetoPoint> points{{"one's", 10, 0.2}, {"two", 10.5, 0.2}, {"three", 20, 0.3}};
+  const std::string program = pareto_figure({{"a", points}, {"b", points}}, "title", "", "cost", "error", {800, 400});
+  for (const char* name : {"points_1", "points_2"})
+    EXPECT_EQ(block(program, name), (std::vector<std::vector<double>>{{10, 0.2}, {10.5, 0.2}, {20, 0.3}}));
+  EXPECT_EQ(block(program, "front_1"), (std::vector<std::vector<double>>{{10, 0.2}}));
+  for (const char* label : {"'one''s'", "'two'", "'three'"}) EXPECT_NE(program.find(label), std::string::npos) << label;
 }
 
 }  // namespace
