@@ -281,7 +281,8 @@ RecipeResult run_recipe(const Recipe& recipe, std::uint64_t seed, Monitor& monit
       for (const auto& [name, value] : row.fixed) published.set(name, value);
       const std::vector<float> published_values = TableModel(model, published, table).render().values;
       std::vector<RivalScore> rivals;
-      for (const Rival& rival : recipe.rivals) rivals.push_back(score(rival, table, row.quantity, row.weights, monitor));
+      for (const Rival& rival : recipe.rivals)
+        rivals.push_back(score(rival, table, row.quantity, row.weights, monitor));
       for (const std::vector<std::string>& free : row.free_sets) {
         const FitOptions options{.free = free, .quantity = row.quantity, .weights = row.weights, .seed = seed};
         RecipeResultRow line{.row = &row,
