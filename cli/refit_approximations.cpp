@@ -4,12 +4,14 @@
 
 #include <cmath>
 #include <iostream>
+#include <utility>
 
+#include "cli/forms_text.h"
 #include "cli/output_folder.h"
+#include "evaluate/check.h"
 #include "evaluate/form_shader.h"
 #include "evaluate/shader.h"
 #include "fit/approximation_recipe.h"
-#include "reference/output_file.h"
 #include "report/chart.h"
 
 namespace lobefit {
@@ -18,63 +20,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string row_title(const ApproximationFit& fit) {
-  return fit.row->name + (fit.row->each.empty() ? "" : fmt::format(", {} = {:g}", fit.row->each, fit.each_value));
-}
-
-std::vector<double> published_values(const ApproximationRow& row) {
-  std::vector<double> values;
-  for (const PublishedConstant& constant : row.published) values.push_back(constant.value);
-  return values;
-}
-
-std::string refit_text(const RefittedConstant& constant) {
-  if (!constant.free) return fmt::format("({:.6g})", constant.value);
-  if (!constant.identifiable) return fmt::format("{:.6g}, undecided", constant.value);
-  if (constant.at_bound) return fmt::format("{:.6g}, at its bound", constant.value);
-  return fmt::format("{:.6g} [{:.5g}, {:.5g}]", constant.value, constant.ci_low, constant.ci_high);
-}
-
-std::string error_text(double error, FormMetric metric) {
-  return metric == FormMetric::relative ? fmt::format("{:.3g} %", 100.0 * error) : fmt::format("{:.3g}", error);
-}
-
-std::string domain_text(const ApproximationRow& row) {
-  std::string text;
-  for (const DomainAxis& axis : row.domain.axes) {
-    const auto [low, high] = std::minmax_element(axis.given.begin(), axis.given.end());
-    text += fmt::format("{}{} {:g} … {:g}{} ({})", text.empty() ? "" : ", ", axis.argument, *low, *high,
-                        axis.degrees ? "°" : "", axis.given.size());
-  }
-  return text;
-}
-
-std::string reading_text(const FormReading& reading) {
-  return fmt::format("{}, {}{}", form_norm_names[static_cast<std::size_t>(reading.norm)],
-                     form_metric_names[static_cast<std::size_t>(reading.metric)],
-                     reading.domain.empty() ? "" : ", " + reading.domain);
-}
-
-std::string verdict(const ApproximationFit& fit) {
-  std::string found;
-  for (const FormReading& reading : fit.readings) {
-    if (reading.meets_published) found += (found.empty() ? "" : "; ") + reading_text(reading);
-  }
-  if (!found.empty()) return "to all their digits: " + found;
-  if (fit.readings.empty()) return "";
-  return fmt::format("none; nearest ({:.2g} % off): {}", 100.0 * fit.readings.front().distance,
-                     reading_text(fit.readings.front()));
-}
-
 std::string operations_text(const Form& form) {
   if (!form.has_shader) return "an integral";
-  std::vector<double> constants;
-  for (const FormConstant& constant : form.constants) constants.push_back(constant.initial);
-  return fmt::format("{} operations", form_operations(form.name, constants).total());
+  return fmt::format("{} operations", form_operations(form.name, form.published()).total());
 }
 
 std::string result_page(const ApproximationRecipe& recipe, const ApproximationResult& result,
-                        const std::string& command) {
+                        const std::vector<JsonReader>& lines, const std::string& command) {
   std::string page = "# " + recipe.title + "\n\n" + recipe.description + "\n\n";
   page +=
       "Made by `" + command +
@@ -88,7 +40,7 @@ std::string result_page(const ApproximationRecipe& recipe, const ApproximationRe
     if (!row.note.empty()) page += row.note + "\n\n";
     page += fmt::format("`{}` ({}; {}) for `{}`: {}. Over {}; fitted for the least {} {} error.\n\n", row.form->formula,
                         row.form->source, operations_text(*row.form), row.target->name, row.target->title,
-                        domain_text(row), form_norm_names[static_cast<std::size_t>(row.norm)],
+                        form_domain_text(lines[i]), form_norm_names[static_cast<std::size_t>(row.norm)],
                         form_metric_names[static_cast<std::size_t>(row.metric)]);
     page += "|" + (row.each.empty() ? std::string() : " " + row.each + " |");
     for (const FormConstant& constant : row.form->constants) page += fmt::format(" {} |", constant.name);
@@ -106,12 +58,14 @@ std::string result_page(const ApproximationRecipe& recipe, const ApproximationRe
     for (; i < result.fits.size() && result.fits[i].row == &row; ++i) {
       const ApproximationFit& fit = result.fits[i];
       page += "|" + (row.each.empty() ? std::string() : fmt::format(" {:g} |", fit.each_value));
-      for (const RefittedConstant& constant : fit.constants) page += " " + refit_text(constant) + " |";
-      page += fmt::format(" {} | {} | {} | {} |", row.has_published ? error_text(fit.published.rms, row.metric) : "–",
-                          error_text(fit.refit.rms, row.metric),
-                          row.has_published ? error_text(fit.published.max, row.metric) : "–",
-                          error_text(fit.refit.max, row.metric));
-      if (row.has_published) page += " " + verdict(fit) + " |";
+      for (const FormConstant& constant : row.form->constants) {
+        page += " " + form_constant_text(lines[i].at("params").at(constant.name)) + " |";
+      }
+      for (const char* norm : {"rms", "max"}) {
+        page += " " + (row.has_published ? form_error_text(lines[i], norm, "published") : "–") + " | " +
+                form_error_text(lines[i], norm, "refit") + " |";
+      }
+      if (row.has_published) page += " " + form_verdict(lines[i]) + " |";
       page += "\n";
     }
     const ApproximationFit& last = result.fits[i - 1];
@@ -119,8 +73,8 @@ std::string result_page(const ApproximationRecipe& recipe, const ApproximationRe
     for (std::size_t r = 0; r < row.rivals.size(); ++r) {
       const Form& rival = *row.rivals[r];
       page += fmt::format("- beside it `{}` as published ({}; {}): rms {}, max {}\n", rival.formula, rival.source,
-                          operations_text(rival), error_text(last.rivals[r].rms, row.metric),
-                          error_text(last.rivals[r].max, row.metric));
+                          operations_text(rival), form_error_text(lines[i - 1], "rms", rival.name),
+                          form_error_text(lines[i - 1], "max", rival.name));
     }
     if (last.integral) {
       page += fmt::format("- integral over the circle: target {:.5g}, published {:.5g}, refit {:.5g}\n",
@@ -131,10 +85,11 @@ std::string result_page(const ApproximationRecipe& recipe, const ApproximationRe
   return page;
 }
 
-void print_result(const ApproximationResult& result) {
+void print_result(const ApproximationResult& result, const std::vector<JsonReader>& lines) {
   fmt::print("  {:<34} {:<46} {:>12} {:>12}  {}\n", "row", "constants", "max publ.", "max refit",
              "published is optimal by");
-  for (const ApproximationFit& fit : result.fits) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const ApproximationFit& fit = result.fits[i];
     const ApproximationRow& row = *fit.row;
     std::string constants;
     for (const std::size_t k : row.free) {
@@ -142,9 +97,9 @@ void print_result(const ApproximationResult& result) {
                                fit.constants[k].value);
     }
     if (row.free.size() > 4) constants = fmt::format("{} constants", row.free.size());
-    fmt::print("  {:<34} {:<46} {:>12} {:>12}  {}\n", row_title(fit), constants,
-               row.has_published ? error_text(fit.published.max, row.metric) : "–",
-               error_text(fit.refit.max, row.metric), verdict(fit));
+    fmt::print("  {:<34} {:<46} {:>12} {:>12}  {}\n", form_line_title(lines[i]), constants,
+               row.has_published ? form_error_text(lines[i], "max", "published") : "–",
+               form_error_text(lines[i], "max", "refit"), form_verdict(lines[i]));
   }
 }
 
@@ -162,7 +117,7 @@ std::string axis_label(const DomainAxis& axis) {
 }
 
 /// Errors along the first axis of the domain: published, refit and rivals; of a second axis up to four panels.
-void write_errors(const ApproximationFit& fit, const std::string& name, const OutputFolder& folder) {
+void write_errors(const ApproximationFit& fit, const std::string& title, const OutputFolder& folder) {
   const ApproximationRow& row = *fit.row;
   const DomainAxis& axis = row.domain.axes.front();
   if (axis.values.size() < 2) return;
@@ -172,13 +127,9 @@ void write_errors(const ApproximationFit& fit, const std::string& name, const Ou
     std::vector<double> constants;
   };
   std::vector<Line> lines;
-  if (row.has_published) lines.push_back({"published", row.form, published_values(row)});
+  if (row.has_published) lines.push_back({"published", row.form, row.published_values()});
   lines.push_back({row.has_published ? "refit" : "fit", row.form, fit.values()});
-  for (const Form* rival : row.rivals) {
-    Line line{std::string(rival->name), rival, {}};
-    for (const FormConstant& constant : rival->constants) line.constants.push_back(constant.initial);
-    lines.push_back(std::move(line));
-  }
+  for (const Form* rival : row.rivals) lines.push_back({std::string(rival->name), rival, rival->published()});
   std::vector<std::string> labels;
   for (const Line& line : lines) labels.push_back(line.label);
 
@@ -188,17 +139,17 @@ void write_errors(const ApproximationFit& fit, const std::string& name, const Ou
   std::vector<ChartPanel> panels;
   for (std::size_t p = 0; p < panel_count; ++p) {
     FormDomain slice = row.domain;
-    std::string title;
+    std::string place;
     for (std::size_t k = 1; k < slice.axes.size(); ++k) {
       DomainAxis& other = slice.axes[k];
       const std::size_t at = panel_count == 1 ? 0 : p * (other.values.size() - 1) / (panel_count - 1);
       const std::string label = axis_label(other);
-      title += fmt::format("{}{} = {:.3g}{}", title.empty() ? "" : ", ", label.substr(0, label.find(',')),
+      place += fmt::format("{}{} = {:.3g}{}", place.empty() ? "" : ", ", label.substr(0, label.find(',')),
                            other.given[at], other.degrees ? "°" : "");
       other.values = {other.values[at]};
     }
     const std::vector<std::vector<double>> points = domain_points(row, slice, fit.each_value);
-    ChartPanel panel{.title = title, .series = std::vector<ChartSeries>(lines.size()), .lower = 0.0, .upper = 0.0};
+    ChartPanel panel{.title = place, .series = std::vector<ChartSeries>(lines.size()), .lower = 0.0, .upper = 0.0};
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double truth = row.target->evaluate(points[i]);
       for (std::size_t l = 0; l < lines.size(); ++l) {
@@ -221,17 +172,17 @@ void write_errors(const ApproximationFit& fit, const std::string& name, const Ou
   const double step = std::pow(10.0, std::floor(std::log10(span / 2.0)));
   const double tick = span / step > 10.0 ? 5.0 * step : span / step > 4.0 ? 2.0 * step : step;
   const std::string program =
-      chart_figure(panels, labels, fmt::format("{}: error of {}", row_title(fit), row.form->name),
+      chart_figure(panels, labels, fmt::format("{}: error of {}", title, row.form->name),
                    row.metric == FormMetric::relative ? "relative error, per cent" : "absolute error", axis_label(axis),
                    {.left = *low, .right = *high, .tick = tick});
   for (const char* extension : {".svg", ".png"}) {
-    write_figure(program, folder.path(name + extension), true, chart_figure_size(panels));
+    write_figure(program, folder.path(row.name + extension), true, chart_figure_size(panels));
   }
 }
 
-/// In float against double, both with float32-rounded constants and arguments: the largest error over the bound of
-/// `lobefit check`, 1e-5 of the value and 1e-6.
-Json check_in_float(const ApproximationFit& fit) {
+/// In float against double, both with float32-rounded constants and arguments, within the bound of `lobefit check`.
+Json check_in_float(const ApproximationFit& fit, const std::string& title) {
+  const CheckOptions bounds;
   const ApproximationRow& row = *fit.row;
   std::vector<double> constants;
   for (const double value : fit.values()) constants.push_back(static_cast<double>(static_cast<float>(value)));
@@ -242,14 +193,10 @@ Json check_in_float(const ApproximationFit& fit) {
     const double truth = row.form->evaluate(constants, x, nullptr);
     const double error = std::abs(static_cast<double>(form_in_float(row.form->name, constants, x)) - truth);
     largest = std::max(largest, error);
-    if (std::abs(truth) > 1e-3) relative = std::max(relative, error / std::abs(truth));
-    excess = std::max(excess, error / (1e-5 * std::abs(truth) + 1e-6));
+    if (std::abs(truth) > smallest_relative_value) relative = std::max(relative, error / std::abs(truth));
+    excess = std::max(excess, error / (bounds.relative_bound * std::abs(truth) + bounds.absolute_bound));
   }
-  return {{"row", row_title(fit)}, {"max_abs", largest}, {"max_rel", relative}, {"passed", excess <= 1.0}};
-}
-
-std::string file_name(const ApproximationFit& fit) {
-  return fit.row->name + (fit.row->each.empty() ? "" : fmt::format(".{}_{:g}", fit.row->each, fit.each_value));
+  return {{"row", title}, {"max_abs", largest}, {"max_rel", relative}, {"passed", excess <= 1.0}};
 }
 
 }  // namespace
@@ -263,30 +210,29 @@ void refit_approximations(const fs::path& path, const std::string& output, const
   Json document = result.json(recipe, context.command), checks = Json::array();
   bool passed = true;
   const ApproximationRow* drawn = nullptr;
-  for (const ApproximationFit& fit : result.fits) {
+  const std::vector<JsonReader> lines = JsonReader(document, "result.json").at("rows").elements();
+  for (std::size_t i = 0; i < lines.size(); ++i) {
     monitor->check();
-    const std::string name = file_name(fit);
-    for (const std::string& language : shader_languages()) {
-      if (!fit.row->form->has_shader) break;
-      OutputFile shader(folder.path(name + "." + language), true);
-      const std::string provenance = fmt::format("Refitted by `{}`: {}.", context.command, row_title(fit));
-      shader.write(form_shader(fit.row->form->name, language, fit.values(), std::span(&provenance, 1)));
-      shader.commit();
-    }
-    if (fit.row != drawn) write_errors(fit, fit.row->name, folder);
-    drawn = fit.row;
+    const ApproximationFit& fit = result.fits[i];
+    const std::string title = form_line_title(lines[i]);
+    if (std::exchange(drawn, fit.row) != fit.row) write_errors(fit, title, folder);
     if (!fit.row->form->has_shader) continue;
-    checks.push_back(check_in_float(fit));
+    const std::string provenance = fmt::format("Refitted by `{}`: {}.", context.command, title);
+    for (const std::string& language : shader_languages()) {
+      folder.write(form_line_stem(lines[i]) + "." + language,
+                   form_shader(fit.row->form->name, language, fit.values(), std::span(&provenance, 1)));
+    }
+    checks.push_back(check_in_float(fit, title));
     passed = passed && checks.back()["passed"].get<bool>();
   }
   document["checks"] = checks;
-  folder.write("result.md", result_page(recipe, result, context.command));
+  folder.write("result.md", result_page(recipe, result, lines, context.command));
   folder.write("result.json", document.dump(2) + "\n");
   folder.commit();
   if (context.json) {
     std::cout << document.dump(2) << "\n";
   } else {
-    print_result(result);
+    print_result(result, lines);
     fmt::print("\n{}\n\nWritten to {}: result.json, result.md, shaders and figures; open {}\n", result.conclusion,
                folder.destination().string(), (folder.destination() / (recipe.rows.front().name + ".png")).string());
   }

@@ -13,11 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
-}
-
 /// By what the result holds; results of all recipes have rows.
 HtmlReport refit_report(const fs::path& folder, const JsonReader& result) {
   const std::vector<JsonReader> rows = result.at("rows").elements();

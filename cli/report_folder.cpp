@@ -14,12 +14,12 @@ namespace {
 /// Bytes of figures on a page, as their files have them.
 constexpr std::size_t most_figure_bytes = 1'000'000;
 
+}  // namespace
+
 bool is_there(const fs::path& path) {
   std::error_code ignored;
   return fs::is_regular_file(path, ignored);
 }
-
-}  // namespace
 
 std::shared_ptr<const Table> FolderTables::find(const std::string& sha256) {
   if (!std::exchange(listed_, true)) {

@@ -14,6 +14,8 @@
 
 namespace lobefit {
 
+bool is_there(const std::filesystem::path& path);
+
 /// Tables of a folder by what they hold, each read once.
 class FolderTables {
  public:

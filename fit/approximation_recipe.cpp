@@ -372,8 +372,7 @@ ApproximationFit::Integral integrate(const ApproximationRow& row, const std::vec
 
 ApproximationFit fit_row(const ApproximationRow& row, double each_value, Monitor& monitor) {
   ApproximationFit fit{.row = &row, .each_value = each_value};
-  std::vector<double> published;
-  for (const PublishedConstant& constant : row.published) published.push_back(constant.value);
+  const std::vector<double> published = row.published_values();
   const Sampled sampled = sample(row, row.domain, each_value);
   const std::vector<double> values = refit(row, sampled, row.metric, row.norm, published, no_block, monitor);
   for (const double value : values) fit.constants.push_back({.value = value, .ci_low = value, .ci_high = value});
@@ -393,11 +392,9 @@ ApproximationFit fit_row(const ApproximationRow& row, double each_value, Monitor
   fit.published = score(*row.form, published, sampled, row.metric);
   fit.refit = score(*row.form, values, sampled, row.metric);
   for (const Form* rival : row.rivals) {
-    std::vector<double> constants;
-    for (const FormConstant& constant : rival->constants) constants.push_back(constant.initial);
     ApproximationRow as = row;
     as.form = rival;
-    fit.rivals.push_back(score(*rival, constants, sample(as, row.domain, each_value), row.metric));
+    fit.rivals.push_back(score(*rival, rival->published(), sample(as, row.domain, each_value), row.metric));
   }
   if (row.has_published && !row.free.empty()) fit.readings = read_published_as(row, published, each_value, monitor);
   if (!row.integral.empty()) fit.integral = integrate(row, published, values, each_value);
@@ -430,6 +427,12 @@ std::string conclusion_of(const std::vector<ApproximationFit>& fits) {
 }
 
 }  // namespace
+
+std::vector<double> ApproximationRow::published_values() const {
+  std::vector<double> values;
+  for (const PublishedConstant& constant : published) values.push_back(constant.value);
+  return values;
+}
 
 std::vector<double> ApproximationFit::values() const {
   std::vector<double> result;

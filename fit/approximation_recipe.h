@@ -52,6 +52,8 @@ struct ApproximationRow {
   bool has_published = true;                 // or starting values only
   std::vector<const Form*> rivals;           // scored with their published constants
   std::string integral;                      // an argument, a cosine, over whose angle both are integrated
+
+  std::vector<double> published_values() const;
 };
 
 struct ApproximationRecipe {

@@ -51,6 +51,12 @@ std::vector<Form> make_forms(std::tuple<F...>*) {
 
 }  // namespace
 
+std::vector<double> Form::published() const {
+  std::vector<double> values;
+  for (const FormConstant& constant : constants) values.push_back(constant.initial);
+  return values;
+}
+
 std::size_t Form::constant_index(const std::string& constant) const {
   std::vector<std::string> names;
   for (std::size_t k = 0; k < constants.size(); ++k) {

@@ -19,6 +19,8 @@ struct Form {
       evaluate;
   bool has_shader = true;  // not of integrals
 
+  /// All constants as published.
+  std::vector<double> published() const;
   /// Throws Error(usage) with the names that there are.
   std::size_t constant_index(const std::string& constant) const;
 };

@@ -129,13 +129,16 @@ void TreeJudge::render_matter_sphere(const PhysicalSurface& matter, Monitor& mon
     monitor.advance(1);
   });
   monitor.end();
-  const auto half = [&](std::size_t number) -> SphereBrdf {
-    return [this, number](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
-      if (smooth_ && normalize(wi + wo).z > mirror_cosine) return {};
-      return matter_.at(key(wi, wo))[number];
-    };
+  sphere_truth_error_ = 0.5 * std::max(sphere_difference(matter_brdf(1.0), matter_brdf(0.0)), 0.0);
+}
+
+SphereBrdf TreeJudge::matter_brdf(double first_half) const {
+  return [this, first_half](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
+    // A smooth interface's mirror image is a delta function to matter, and a narrow lobe to slabs.
+    if (smooth_ && normalize(wi + wo).z > mirror_cosine) return {};
+    const std::array<Rgb, 2>& halves = matter_.at(key(wi, wo));
+    return halves[0] * first_half + halves[1] * (1.0 - first_half);
   };
-  sphere_truth_error_ = 0.5 * std::max(sphere_difference(half(0), half(1)), 0.0);
 }
 
 SphereBrdf TreeJudge::brdf_of(std::span<const SimplifyStep> steps) const {
@@ -195,13 +198,7 @@ TreeErrors TreeJudge::compare(const std::vector<View>& shown, const std::vector<
 TreeErrors TreeJudge::model(std::span<const SimplifyStep> steps) const {
   TreeErrors errors = compare(shown(steps, 24), truth_);
   if (!options_.spheres) return errors;
-  const SphereBrdf matter = [this](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
-    // A smooth interface's mirror image is a delta function to matter, and a narrow lobe to slabs.
-    if (smooth_ && normalize(wi + wo).z > mirror_cosine) return {};
-    const std::array<Rgb, 2>& halves = matter_.at(key(wi, wo));
-    return (halves[0] + halves[1]) * 0.5;
-  };
-  errors.sphere_delta_e_itp = sphere_difference(matter, brdf_of(steps));
+  errors.sphere_delta_e_itp = sphere_difference(matter_brdf(0.5), brdf_of(steps));
   return errors;
 }
 

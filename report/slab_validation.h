@@ -69,6 +69,8 @@ class TreeJudge {
                           const WalkOptions& walk_options = {}) const;
   TreeErrors compare(const std::vector<View>& shown, const std::vector<View>& truth) const;
   void render_matter_sphere(const PhysicalSurface& matter, Monitor& monitor);
+  /// From the sphere's samples, the first half of them in this share.
+  SphereBrdf matter_brdf(double first_half) const;
   SphereBrdf brdf_of(std::span<const SimplifyStep> steps) const;
   /// Mean ΔE_ITP of lit spheres; below 0 where they share no pixel.
   double sphere_difference(const SphereBrdf& a, const SphereBrdf& b) const;

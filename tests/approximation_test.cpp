@@ -24,9 +24,7 @@ namespace fs = std::filesystem;
 double target(const std::string& name, std::vector<double> arguments) { return find_target(name).evaluate(arguments); }
 double published(const std::string& name, std::vector<double> arguments) {
   const Form& form = find_form(name);
-  std::vector<double> constants;
-  for (const FormConstant& constant : form.constants) constants.push_back(constant.initial);
-  return form.evaluate(constants, arguments, nullptr);
+  return form.evaluate(form.published(), arguments, nullptr);
 }
 
 // ---- targets
@@ -143,8 +141,7 @@ TEST(Forms, VonMisesIntegratesToItsWeight) {
 TEST(Forms, ShadersCompileInAsciiAndCount) {
   for (const Form& form : forms()) {
     if (!form.has_shader) continue;
-    std::vector<double> constants;
-    for (const FormConstant& constant : form.constants) constants.push_back(constant.initial);
+    const std::vector<double> constants = form.published();
     EXPECT_GT(form_operations(form.name, constants).total(), 0) << form.name;
     for (const std::string& language : shader_languages()) {
       const std::string text = form_shader(form.name, language, constants, {});
@@ -163,7 +160,12 @@ TEST(Forms, ShadersCompileInAsciiAndCount) {
 
 class Recipes : public ::testing::Test {
  protected:
-  Recipes() : folder_(::testing::TempDir() + "lobefit_approximations") { fs::create_directories(folder_); }
+  // ctest runs tests beside each other: to each its own folder.
+  Recipes()
+      : folder_(::testing::TempDir() + "lobefit_approximations_" +
+                ::testing::UnitTest::GetInstance()->current_test_info()->name()) {
+    fs::create_directories(folder_);
+  }
   ~Recipes() override { fs::remove_all(folder_); }
 
   ApproximationRecipe recipe(const std::string& rows) {

@@ -9,12 +9,14 @@
 
 namespace lobefit {
 
-/// Karis 2014, Physically Based Shading on Mobile: Lazarov's form (2013) refitted to Unreal's GGX. The common part.
+/// Karis 2014, Physically Based Shading on Mobile: Lazarov's form (2013) refitted to Unreal's GGX. One form for both
+/// weights; x: μ, α.
 template <class T>
-LOBEFIT_TEXT T karis_falloff(const T& exponent, const T& slope, const T& offset, const T& cos_theta, const T& alpha) {
-  const T roughness = let("roughness", sqrt(alpha));
+LOBEFIT_TEXT T karis_weight(const std::array<T, 6>& k, const std::array<T, 2>& x) {
+  const T roughness = let("roughness", sqrt(x[1]));
   const T smoothness = let("smoothness", 1.0 - roughness);
-  return min(smoothness * smoothness, exp2(exponent * cos_theta)) * smoothness + (slope * roughness + offset);
+  const T falloff = min(smoothness * smoothness, exp2(k[0] * x[0])) * smoothness + (k[1] * roughness + k[2]);
+  return k[3] * falloff + k[4] * roughness + k[5];
 }
 
 struct KarisScale {
@@ -28,7 +30,7 @@ struct KarisScale {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 6>& k, const std::array<T, 2>& x) {
-    return k[3] * karis_falloff(k[0], k[1], k[2], x[0], x[1]) + k[4] * sqrt(x[1]) + k[5];
+    return karis_weight(k, x);
   }
 };
 
@@ -43,7 +45,7 @@ struct KarisBias {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 6>& k, const std::array<T, 2>& x) {
-    return k[3] * karis_falloff(k[0], k[1], k[2], x[0], x[1]) + k[4] * sqrt(x[1]) + k[5];
+    return karis_weight(k, x);
   }
 };
 

@@ -33,8 +33,7 @@ struct JointVisibilityForm {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 2>& c, const std::array<T, 3>& x) {
-    const T a = let("a", c[0] * pow(x[2], c[1]));
-    return 0.5 / (x[0] * (x[1] * (1.0 - a) + a) + x[1] * (x[0] * (1.0 - a) + a));
+    return call<SmithJointApproximation>(x[0], x[1], T(c[0] * pow(x[2], c[1])));
   }
 };
 

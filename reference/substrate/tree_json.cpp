@@ -43,6 +43,14 @@ std::vector<std::string> slab_keys() {
   return keys;
 }
 
+void allow_keys(const JsonReader& reader, const std::vector<std::string>& keys) {
+  for (const auto& [key, member] : reader.members()) {
+    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      throw reader.error("unknown key '" + key + "'", "did you mean '" + nearest_name(key, keys) + "'?");
+    }
+  }
+}
+
 void refuse_together(const JsonReader& reader, const char* helper, std::initializer_list<const char*> others) {
   if (!reader.has(helper)) return;
   for (const char* other : others) {
@@ -110,11 +118,7 @@ SpecularProfilePointer read_profile(const JsonReader& reader) {
 
 TreeNode read_slab(const JsonReader& reader) {
   static const std::vector<std::string> keys = slab_keys();
-  for (const auto& [key, member] : reader.members()) {
-    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-      throw reader.error("unknown key '" + key + "'", "did you mean '" + nearest_name(key, keys) + "'?");
-    }
-  }
+  allow_keys(reader, keys);
   refuse_together(reader, "ior", {"f0", "base_color"});
   refuse_together(reader, "base_color", {"f0", "diffuse_albedo"});
   refuse_together(reader, "transmittance", {"mean_free_path"});
@@ -258,11 +262,7 @@ class TreeReader {
       if (name != model) return;
       std::vector<std::string> keys{"model"};
       for (const ParameterInfo& info : describe_parameters<M>()) keys.emplace_back(info.name);
-      for (const auto& [key, member] : reader.members()) {
-        if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-          throw reader.error("unknown key '" + key + "'", "did you mean '" + nearest_name(key, keys) + "'?");
-        }
-      }
+      allow_keys(reader, keys);
       auto pins = default_parameters<M>();
       read_values<M>(reader, pins);
       index = add_unreal_slabs(tree, pins);

@@ -1,5 +1,6 @@
 #include "reference/substrate/unreal_slabs.h"
 
+#include "models/substrate/blend.h"
 #include "models/substrate/conversions.h"
 
 namespace lobefit {
@@ -13,14 +14,12 @@ SlabValues default_lit(const UnrealSurface<double>& pins) {
   return slab;
 }
 
-Rgb at_most_one(const Rgb& c) { return {min(c.x, 1.0), min(c.y, 1.0), min(c.z, 1.0)}; }
-
 template <class M>
 int add_scattering(SlabTree& tree, const typename M::template Parameters<double>& pins) {
   const ScatteredShares scattered = scattered_shares<M>(pins);
   SlabValues slab = default_lit(pins);
-  slab.diffuse_albedo = at_most_one(slab.diffuse_albedo + scattered.back);
-  slab.mean_free_path = mean_free_path_of(at_most_one(scattered.through), slab.thickness);
+  slab.diffuse_albedo = at_most(slab.diffuse_albedo + scattered.back, 1.0);
+  slab.mean_free_path = mean_free_path_of(at_most(scattered.through, 1.0), slab.thickness);
   return tree.add_slab(slab, std::string(unreal_slab_name<M>));
 }
 
