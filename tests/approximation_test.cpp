@@ -94,10 +94,6 @@ TEST(Forms, ArePartsOfTheModels) {
   for (const double mu : {0.05, 0.3, 0.8}) {
     for (const double alpha : {0.1, 0.45, 0.9}) {
       EXPECT_NEAR(published("schlick_masking", {mu, alpha}), SchlickG1::evaluate(mu, 0.5 * alpha), 1e-15);
-      EXPECT_NEAR(published("karis_scale", {mu, alpha}), KarisAlbedo::f0_weight(mu, alpha), 1e-14);
-      EXPECT_NEAR(published("karis_bias", {mu, alpha}), KarisAlbedo::f90_weight(mu, alpha), 1e-14);
-      EXPECT_NEAR(published("materialx_scale", {mu, alpha}), MaterialXAlbedo::f0_weight(mu, alpha), 1e-14);
-      EXPECT_NEAR(published("materialx_bias", {mu, alpha}), MaterialXAlbedo::f90_weight(mu, alpha), 1e-14);
       const double sine = std::sqrt(1.0 - mu * mu);
       EXPECT_NEAR(published("beckmann_rational", {mu / (alpha * sine)}), SmithBeckmannG1::evaluate(mu, sine, alpha),
                   1e-14);

@@ -9,6 +9,7 @@
 
 #include "evaluate/single.h"
 #include "fit/dual.h"
+#include "fit/forms.h"
 #include "models/energy/compensated_ggx.h"
 #include "models/registry.h"
 #include "models/specular/haze.h"
@@ -119,19 +120,25 @@ struct Error {
 
 TEST(GgxAlbedo, ErrorsOfTheTableAndOfThePublishedFits) {
   Error table, weight, material_x, material_x_f0, karis, karis_f0;
+  const auto form = [](const char* name, double mu, double alpha) {
+    const Form& found = find_form(name);
+    return found.evaluate(found.published(), std::vector{mu, alpha}, nullptr);
+  };
   for (int i = 0; i < 32; ++i) {
     for (int k = 0; k < 32; ++k) {
       const double x = (i + 0.43) / 32.0, y = (k + 0.57) / 32.0, mu = x * x, alpha = std::max(y * y, 1e-3);
       const double truth = albedo(mu, alpha), grazing = grazing_albedo(mu, alpha);
       table.add(1.0 - GgxAlbedoLoss::evaluate(mu, alpha) - truth);
       weight.add(GgxSchlickWeight::evaluate(mu, alpha) - grazing / truth);
-      material_x.add(MaterialXAlbedo::f0_weight(mu, alpha) + MaterialXAlbedo::f90_weight(mu, alpha) - truth);
-      karis.add(KarisAlbedo::f0_weight(mu, alpha) + KarisAlbedo::f90_weight(mu, alpha) - truth);
+      const double material_x_scale = form("materialx_scale", mu, alpha);
+      const double material_x_bias = form("materialx_bias", mu, alpha);
+      const double karis_scale = form("karis_scale", mu, alpha), karis_bias = form("karis_bias", mu, alpha);
+      material_x.add(material_x_scale + material_x_bias - truth);
+      karis.add(karis_scale + karis_bias - truth);
       // A dielectric: f0 = .04, f90 = 1.
       const double dielectric = 0.04 * (truth - grazing) + grazing;
-      material_x_f0.add(0.04 * MaterialXAlbedo::f0_weight(mu, alpha) + MaterialXAlbedo::f90_weight(mu, alpha) -
-                        dielectric);
-      karis_f0.add(0.04 * KarisAlbedo::f0_weight(mu, alpha) + KarisAlbedo::f90_weight(mu, alpha) - dielectric);
+      material_x_f0.add(0.04 * material_x_scale + material_x_bias - dielectric);
+      karis_f0.add(0.04 * karis_scale + karis_bias - dielectric);
     }
   }
   const auto report = [](const char* name, const Error& error) {

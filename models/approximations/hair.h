@@ -4,8 +4,8 @@
 #include <tuple>
 
 #include "models/approximations/form.h"
-#include "models/hair/fibre.h"
 #include "models/hair/longitudinal.h"
+#include "models/hair/unreal_fits.h"
 
 namespace lobefit {
 
@@ -18,7 +18,7 @@ struct HairModifiedIndex {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 2>& c, const std::array<T, 1>& x) {
-    return c[0] / x[0] + c[1] * x[0];
+    return hair_index_fit(c[0], c[1], x[0]);
   }
 };
 
@@ -32,7 +32,7 @@ struct HairModifiedIndexOfIor {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 4>& c, const std::array<T, 2>& x) {
-    return (c[0] + c[1] * x[1]) / x[0] + (c[2] + c[3] * x[1]) * x[0];
+    return hair_index_fit(T(c[0] + c[1] * x[1]), T(c[2] + c[3] * x[1]), x[0]);
   }
 };
 
@@ -45,7 +45,7 @@ struct HairTtOffset {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 2>& c, const std::array<T, 2>& x) {
-    return sqrt(0.5 + 0.5 * x[0]) * (1.0 + x[1] * (c[0] - c[1] * x[0]));
+    return hair_tt_offset_fit(c[0], c[1], x[1], x[0], T(sqrt(0.5 + 0.5 * x[0])));
   }
 };
 
@@ -58,7 +58,7 @@ struct ExponentialCosine {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 2>& c, const std::array<T, 1>& x) {
-    return exp(c[0] * x[0] - c[1]);
+    return hair_azimuth_fit(c[0], c[1], x[0]);
   }
 };
 
@@ -80,8 +80,8 @@ struct VonMises {
 
 /// sin²γ_t of the TT ray in the code's own index.
 template <class T>
-LOBEFIT_TEXT T hair_inner_sine2(const T& inverse, const T& cosine, const T& cos_theta_d, const T& h) {
-  const T a = let("a", cos_theta_d / (inverse + cosine * cos_theta_d * cos_theta_d));
+LOBEFIT_TEXT T hair_inner_sine2(const T& c1, const T& c2, const T& cos_theta_d, const T& h) {
+  const T a = let("a", hair_inverse_index_fit(c1, c2, cos_theta_d));
   return let("inner", h * h * (a * a));
 }
 
@@ -95,7 +95,7 @@ struct HairTtExponent {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 3>& c, const std::array<T, 2>& x) {
-    return c[0] * sqrt(1.0 - hair_inner_sine2(c[1], c[2], x[0], x[1])) / x[0];
+    return hair_tt_exponent_fit(c[0], T(sqrt(1.0 - hair_inner_sine2(c[1], c[2], x[0], x[1]))), x[0]);
   }
 };
 
@@ -109,7 +109,7 @@ struct HairTtChordAsCoded {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 3>& c, const std::array<T, 2>& x) {
-    return c[0] * abs(1.0 - hair_inner_sine2(c[1], c[2], x[0], x[1]) / x[0]);
+    return c[0] * hair_tt_chord_as_coded(hair_inner_sine2(c[1], c[2], x[0], x[1]), x[0]);
   }
 };
 
@@ -123,7 +123,7 @@ struct HairTtChord {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 3>& c, const std::array<T, 2>& x) {
-    return c[0] * max(1.0 - hair_inner_sine2(c[1], c[2], x[0], x[1]), 0.0) / x[0];
+    return c[0] * hair_tt_chord(hair_inner_sine2(c[1], c[2], x[0], x[1]), x[0]);
   }
 };
 
@@ -136,7 +136,7 @@ struct HairTrtExponent {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 1>& c, const std::array<T, 1>& x) {
-    return c[0] / x[0];
+    return hair_trt_exponent_fit(c[0], x[0]);
   }
 };
 
@@ -150,8 +150,7 @@ struct HairTrtFresnel {
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 1>& c, const std::array<T, 2>& x) {
-    const T f = let("f", call<HairSchlick>(T(x[0] * c[0]), x[1]));
-    return square(1.0 - f) * f;
+    return hair_trt_fresnel_fit(c[0], x[0], x[1]);
   }
 };
 

@@ -43,13 +43,14 @@ struct BeckmannRationalForm {
                                     formula = "G1 = min((p1 c + p2 c²)/(1 + q1 c + q2 c²), 1), c = min(cotθ/α, 1.6)",
                                     source = "Walter et al. 2007, section 5.1";
   static constexpr std::array<std::string_view, 1> arguments{"cotangent"};
-  static constexpr std::array constants{FormConstant{"p1", 3.535, 0.0, 10.0}, FormConstant{"p2", 2.181, 0.0, 20.0},
-                                        FormConstant{"q1", 2.276, 0.0, 10.0}, FormConstant{"q2", 2.577, 0.0, 20.0}};
+  static constexpr std::array constants{FormConstant{"p1", walter_beckmann_constants[0], 0.0, 10.0},
+                                        FormConstant{"p2", walter_beckmann_constants[1], 0.0, 20.0},
+                                        FormConstant{"q1", walter_beckmann_constants[2], 0.0, 10.0},
+                                        FormConstant{"q2", walter_beckmann_constants[3], 0.0, 20.0}};
 
   template <class T>
   LOBEFIT_TEXT static T evaluate(const std::array<T, 4>& k, const std::array<T, 1>& x) {
-    const T c = let("c", min(x[0], 1.6));
-    return min((k[0] * c + k[1] * c * c) / (1.0 + k[2] * c + k[3] * c * c), 1.0);
+    return walter_beckmann_g1(k, x[0]);
   }
 };
 

@@ -1,8 +1,8 @@
 // How much light one bounce between GGX mirrors returns: E(μ, α) for F = 1, height-correlated Smith masking. Energy
 // compensation is made of it (compensation.h).
 //
-// The table is our own integral. Two published fits stand beside it. Errors against the integral, evenly over √μ and √α
-// (tests/energy_test.cpp prints them), at worst and rms:
+// The table is our own integral. Two published fits stand in models/approximations/albedo.h. Errors against the
+// integral, evenly over √μ and √α (tests/energy_test.cpp prints them), at worst and rms:
 //
 //               F = 1             f0 = .04
 //   table       4.4e-4, 7.4e-5
@@ -75,53 +75,6 @@ struct GgxSchlickWeight {
   template <class G, class T>
   LOBEFIT_TEXT static T evaluate(const G& cos_theta, const T& alpha) {
     return saturate(lookup<GgxSchlickWeightTable>(T(sqrt(cos_theta)), T(sqrt(alpha))));
-  }
-};
-
-/// MaterialX's rational quadratics in μ and α, the library's `mx_ggx_dir_albedo_analytic`: E_F = f0 A + f90 B.
-struct MaterialXAlbedo {
-  template <class G, class T>
-  LOBEFIT_TEXT static T f0_weight(const G& cos_theta, const T& alpha) {
-    return ratio(cos_theta, alpha, {0.1003, -0.6303, 9.748, -2.038, 29.34, -8.245, -26.44, 19.99, -5.448},
-                 {1.0, -1.765, 8.263, 11.53, 28.96, -7.507, -36.11, 15.86, 33.37});
-  }
-  template <class G, class T>
-  LOBEFIT_TEXT static T f90_weight(const G& cos_theta, const T& alpha) {
-    return ratio(cos_theta, alpha, {0.9345, -2.323, 2.229, -3.748, 1.424, -0.7684, 1.436, 0.2913, 0.6286},
-                 {1.0, 0.2281, 15.94, -55.83, 13.08, 41.26, 54.9, 300.2, -285.1});
-  }
-
- private:
-  /// Of 1, x, y, xy, x², y², x²y, xy², x²y².
-  template <class G, class T>
-  LOBEFIT_TEXT static T quadratic(const G& x, const T& y, const std::array<double, 9>& k) {
-    return k[0] + k[1] * x + k[4] * x * x + y * (k[2] + k[3] * x + k[6] * x * x) +
-           y * y * (k[5] + k[7] * x + k[8] * x * x);
-  }
-  template <class G, class T>
-  LOBEFIT_TEXT static T ratio(const G& x, const T& y, const std::array<double, 9>& above,
-                              const std::array<double, 9>& below) {
-    return saturate(quadratic(x, y, above) / quadratic(x, y, below));
-  }
-};
-
-/// Karis 2014, Physically Based Shading on Mobile: Lazarov's form (2013, for Blinn-Phong) refitted to Unreal's GGX; f90
-/// is 1.
-struct KarisAlbedo {
-  template <class G, class T>
-  LOBEFIT_TEXT static T f0_weight(const G& cos_theta, const T& alpha) {
-    return -1.04 * falloff(cos_theta, alpha) + (1.04 - 0.572 * sqrt(alpha));
-  }
-  template <class G, class T>
-  LOBEFIT_TEXT static T f90_weight(const G& cos_theta, const T& alpha) {
-    return 1.04 * falloff(cos_theta, alpha) + (0.022 * sqrt(alpha) - 0.04);
-  }
-
- private:
-  template <class G, class T>
-  LOBEFIT_TEXT static T falloff(const G& cos_theta, const T& alpha) {
-    const T smoothness = 1.0 - sqrt(alpha);
-    return min(smoothness * smoothness, exp2(-9.28 * cos_theta)) * smoothness + (0.0425 - 0.0275 * sqrt(alpha));
   }
 };
 

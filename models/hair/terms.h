@@ -5,6 +5,7 @@
 #pragma once
 
 #include "models/hair/longitudinal.h"
+#include "models/hair/unreal_fits.h"
 #include "models/specular/term.h"
 
 namespace lobefit {
@@ -46,7 +47,7 @@ struct EtaPrimeFitText : HairTermText {
   template <class G, class T>
   LOBEFIT_TEXT static auto at(const Geometry<G>& g, const T& inverse, const T& cosine) {
     Inclinations<G> inclinations = make_inclinations(g);
-    return inverse / inclinations.cos_theta_d + cosine * inclinations.cos_theta_d;
+    return hair_index_fit(inverse, cosine, inclinations.cos_theta_d);
   }
 };
 
@@ -75,7 +76,7 @@ struct TtOffsetFitText : HairTermText {
     Azimuth<G> azimuth = make_azimuth<false>(g);
     const auto a = inverse_bravais_index(ior, inclinations.cos_theta_d);
     // |h| as above: at other constants it may change its sign, and only h² enters a shading.
-    return abs(azimuth.cos_half_phi * (1.0 + a * (constant - cosine * azimuth.cos_phi)));
+    return abs(hair_tt_offset_fit(constant, cosine, a, azimuth.cos_phi, azimuth.cos_half_phi));
   }
 };
 
@@ -111,7 +112,7 @@ struct TtAzimuthFitText : HairTermText {
   template <class G, class T>
   LOBEFIT_TEXT static auto at(const Geometry<G>& g, const T& cosine, const T& constant) {
     Azimuth<G> azimuth = make_azimuth<false>(g);
-    return exp(-cosine * azimuth.cos_phi - constant);
+    return hair_azimuth_fit(T(-cosine), constant, azimuth.cos_phi);
   }
 };
 
@@ -135,7 +136,7 @@ struct TrtAzimuthFitText : HairTermText {
   template <class G, class T>
   LOBEFIT_TEXT static auto at(const Geometry<G>& g, const T& cosine, const T& constant) {
     Azimuth<G> azimuth = make_azimuth<false>(g);
-    return exp(cosine * azimuth.cos_phi - constant);
+    return hair_azimuth_fit(cosine, constant, azimuth.cos_phi);
   }
 };
 
@@ -196,7 +197,7 @@ struct TtTransmittanceFitText : HairTermText {
     Azimuth<G> azimuth = make_azimuth<false>(g);
     const T a = inverse_bravais_index(ior, inclinations.cos_theta_d);
     InnerCosines<T> inner = inner_cosines(ior, T(exact_tt_offset(a, azimuth)), inclinations.cos_theta_d);
-    return pow(color, exponent * inner.gamma / inclinations.cos_theta_d);
+    return pow(color, hair_tt_exponent_fit(exponent, inner.gamma, inclinations.cos_theta_d));
   }
 };
 
@@ -223,7 +224,7 @@ struct TrtTransmittanceFitText : HairTermText {
   template <class G, class T>
   LOBEFIT_TEXT static auto at(const Geometry<G>& g, const T& color, const T& exponent) {
     Inclinations<G> inclinations = make_inclinations(g);
-    return pow(color, exponent / inclinations.cos_theta_d);
+    return pow(color, hair_trt_exponent_fit(exponent, inclinations.cos_theta_d));
   }
 };
 

@@ -3,6 +3,7 @@
 
 #include "models/hair/absorption.h"
 #include "models/hair/fibre.h"
+#include "models/hair/unreal_fits.h"
 #include "models/hair/unreal_lobes.h"
 #include "models/model.h"
 
@@ -152,28 +153,30 @@ struct HairUnreal {
                              lerp(1.0, p.backlit, saturate(-g.cos_light_view)));
 
     // TT
-    const T a = let("a", cos_theta_d / (p.eta_prime_inverse + p.eta_prime_cosine * cos_theta_d * cos_theta_d));
-    const T h = let("h", cos_half_phi * (1.0 + a * (p.tt_offset_constant - p.tt_offset_cosine * cos_phi)));
+    const T a = let("a", hair_inverse_index_fit(p.eta_prime_inverse, p.eta_prime_cosine, cos_theta_d));
+    const T h = let("h", hair_tt_offset_fit(p.tt_offset_constant, p.tt_offset_cosine, a, cos_phi, cos_half_phi));
     const T enters_tt = let("enters_tt", call<SchlickTransmittance>(cos_theta_d * sqrt(1.0 - min(h * h, 1.0)), f0));
     const T inner = let("inner", h * h * (a * a));  // sin²γ_t
     const T d_b = let("d_b", call<ChiangAbsorptionScale>(p.absorption_roughness));
-    const T length = let(
-        "chord", select(p.absorption_form < 1.5, abs(1.0 - inner / cos_theta_d), max(1.0 - inner, 0.0) / cos_theta_d));
+    const T length = let("chord", select(p.absorption_form < 1.5, hair_tt_chord_as_coded(inner, cos_theta_d),
+                                         hair_tt_chord(inner, cos_theta_d)));
     const auto legacy = p.absorption_form < 0.5;
-    const T linear = let("linear_part", select(legacy, p.tt_absorption * sqrt(1.0 - inner) / cos_theta_d, T(0.0)));
+    const T linear =
+        let("linear_part",
+            select(legacy, T(hair_tt_exponent_fit(p.tt_absorption, T(sqrt(1.0 - inner)), cos_theta_d)), T(0.0)));
     const T quadratic = let("quadratic_part", select(legacy, T(0.0), 2.0 * length / (d_b * d_b)));
     Vec3<T> t_tt = let("t_tt", call<HairTransmittance>(p.base_color, linear, quadratic));
-    const T n_tt = let("n_tt", exp(-p.tt_azimuth_cosine * cos_phi - p.tt_azimuth_constant));
+    const T n_tt = let("n_tt", hair_azimuth_fit(T(-p.tt_azimuth_cosine), p.tt_azimuth_constant, cos_phi));
     const T tt = let("tt", call<HairGaussian>(p.width_tt * width, sines - p.tilt_tt * p.shift) *
                                (n_tt * square(enters_tt) * p.backlit));
 
     // TRT
-    const T f_trt = let("f_trt", call<HairSchlick>(cos_theta_d * p.trt_cosine, f0));
-    const T enters_trt = let("enters_trt", call<SchlickTransmittance>(cos_theta_d * p.trt_cosine, f0));
-    Vec3<T> t_trt = let("t_trt", call<HairColorPower>(p.base_color, T(p.trt_absorption / cos_theta_d)));
-    const T n_trt = let("n_trt", exp(p.trt_azimuth_cosine * cos_phi - p.trt_azimuth_constant));
-    const T trt = let("trt", call<HairGaussian>(p.width_trt * width, sines - p.tilt_trt * p.shift) *
-                                 (n_trt * square(enters_trt) * f_trt));
+    const T fresnel_trt = let("fresnel_trt", hair_trt_fresnel_fit(p.trt_cosine, cos_theta_d, f0));
+    Vec3<T> t_trt =
+        let("t_trt", call<HairColorPower>(p.base_color, T(hair_trt_exponent_fit(p.trt_absorption, cos_theta_d))));
+    const T n_trt = let("n_trt", hair_azimuth_fit(p.trt_azimuth_cosine, p.trt_azimuth_constant, cos_phi));
+    const T trt =
+        let("trt", call<HairGaussian>(p.width_trt * width, sines - p.tilt_trt * p.shift) * (n_trt * fresnel_trt));
 
     // Kajiya and Kay's diffuse term, and a Lambertian one about the normal that faces the view.
     const G facing = let("facing", g.tangential_dot / max(inclinations.cos_theta_v, smallest_base));

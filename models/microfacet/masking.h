@@ -81,17 +81,23 @@ struct KelemenMasking {
   }
 };
 
-/// Walter's rational fit to Smith's G1 of Beckmann facets: 1 from c = 1.6. As printed it passes 1 by up to 6.1e-05
-/// between c = 1.548 and 1.6, where it steps down to 1: the minimum removes both the excess and the step, on which
-/// float and double would disagree.
+/// Walter's rational fit to Smith's G1 of Beckmann facets over c = cot θ/α: (p1 c + p2 c²)/(1 + q1 c + q2 c²), 1 from
+/// c = 1.6. As printed it passes 1 by up to 6.1e-05 between c = 1.548 and 1.6, where it steps down to 1: the minimum
+/// removes both the excess and the step, on which float and double would disagree.
+inline constexpr std::array walter_beckmann_constants{3.535, 2.181, 2.276, 2.577};  // p1, p2, q1, q2
+template <class K, class T>
+LOBEFIT_TEXT auto walter_beckmann_g1(const std::array<K, 4>& k, const T& cotangent) {
+  const auto c = let("c", min(cotangent, 1.6));
+  return min((k[0] * c + k[1] * c * c) / (1.0 + k[2] * c + k[3] * c * c), 1.0);
+}
+
 struct SmithBeckmannG1 {
   static constexpr const char* name = "g1_smith_beckmann";
   static constexpr std::array arguments{"cos_theta", "sin_theta", "alpha"};
 
   template <class G, class T>
   LOBEFIT_TEXT static auto evaluate(const G& cos_theta, const G& sin_theta, const T& alpha) {
-    const auto c = let("c", min(cos_theta / max(alpha * sin_theta, smallest_base), 1.6));
-    return min((3.535 * c + 2.181 * c * c) / (1.0 + 2.276 * c + 2.577 * c * c), 1.0);
+    return walter_beckmann_g1(walter_beckmann_constants, cos_theta / max(alpha * sin_theta, smallest_base));
   }
 };
 
