@@ -184,6 +184,7 @@ FitProvenance fit_provenance(const std::string& path) {
     const JsonReader provenance = reader.at("provenance");
     if (provenance.has("grid")) result.grid = provenance.at("grid").text();
     if (provenance.has("material")) result.material = provenance.at("material").text();
+    if (provenance.has("table")) result.table = provenance.at("table").text();
     if (provenance.has("table_sha256")) result.table_sha256 = provenance.at("table_sha256").text();
   }
   try {

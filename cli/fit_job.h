@@ -45,7 +45,7 @@ FitTable read_fit_table(const FitSource& source, const std::string& grid, const 
 
 /// How a fit took its table, by its JSON file; what the file doesn't say is left to suit the table.
 struct FitProvenance {
-  std::string grid = "auto", weights, metric = "log", material, table_sha256;
+  std::string grid = "auto", weights, metric = "log", material, table, table_sha256;  // table: its path
 };
 /// Throws Error(invalid_input).
 FitProvenance fit_provenance(const std::string& path);

@@ -368,6 +368,8 @@ void refit_substrate_rules(const fs::path& path, const std::string& output, bool
   for (const JudgedTree& tree : trees) tree_rows[tree.name] = tree.validation.json(provenance);
   const Json document{
       {"recipe", recipe.name},
+      {"title", recipe.title},
+      {"description", recipe.description},
       {"rows", rows},
       {"mixes",
        {{"baseline", quantiles_json(mixes.baseline)},

@@ -18,9 +18,10 @@ HtmlReport refit_report(const fs::path& folder, const JsonReader& result) {
   const std::vector<JsonReader> rows = result.at("rows").elements();
   if (rows.empty()) throw result.at("rows").error("the list is empty", "run the recipe again");
   if (rows.front().has("formula")) return forms_report(folder, result);
+  if (result.has("curves")) return curves_report(folder, result);
+  if (result.has("trees")) return substrate_report(folder, result);
   if (result.has("published") && rows.front().has("domain")) return constants_report(folder, result);
-  throw result.error("no page is made of results of this kind",
-                     "give results of constants, closed forms or material fits; result.md tells of the others");
+  throw result.error("no page is made of results of this kind", "run the recipe again, or see its result.md");
 }
 
 HtmlReport folder_report(const fs::path& folder, const std::string& command) {
@@ -29,7 +30,8 @@ HtmlReport folder_report(const fs::path& folder, const std::string& command) {
     throw Error(ExitCode::invalid_input, "no such folder", folder.string(),
                 "name a folder of results, such as out/proxima");
   }
-  const fs::path result = folder / "result.json", summary = folder / "summary.json";
+  const fs::path result = folder / "result.json", summary = folder / "summary.json",
+                 validation = folder / "validation.json";
   if (is_there(result)) {
     const Json json = parse_json(read_file(result), result.string());
     return refit_report(folder, JsonReader(json, result.string()));
@@ -38,8 +40,14 @@ HtmlReport folder_report(const fs::path& folder, const std::string& command) {
     const Json json = parse_json(read_file(summary), summary.string());
     return materials_report(folder, JsonReader(json, summary.string()), command);
   }
-  throw Error(ExitCode::invalid_input, "neither result.json nor summary.json is there", folder.string(),
-              "name a folder that `lobefit refit` or `lobefit fit` over several materials wrote");
+  if (is_there(validation)) {
+    const Json json = parse_json(read_file(validation), validation.string());
+    return slab_report(folder, JsonReader(json, validation.string()));
+  }
+  const std::vector<fs::path> fits = folder_fits(folder);
+  if (!fits.empty()) return fits_report(fits, command);
+  throw Error(ExitCode::invalid_input, "neither result.json, summary.json, validation.json nor a fit is there",
+              folder.string(), "name a folder that `lobefit refit`, `lobefit fit` or `lobefit slab validate` wrote");
 }
 
 }  // namespace
@@ -50,10 +58,10 @@ void add_report(CLI::App& app, Context& context) {
                          "One self-contained HTML page of a folder of results\n"
                          "  lobefit report out/proxima\n"
                          "  lobefit report out/fresnel -o fresnel.html\n"
-                         "The page opens from a file and asks no network. Of refits of constants (proxima), of closed\n"
-                         "forms (fresnel, hair and others) and of fits to several materials. What the folder lacks, "
-                         "tables for the slices\n"
-                         "or shaders for the spheres, is named on the page and here, and left out.");
+                         "The page opens from a file and asks no network. Of refits (result.json), of fits to several\n"
+                         "materials (summary.json), of single fits (any .json of `lobefit fit`), of `slab validate`\n"
+                         "(validation.json). What the folder lacks, tables for the slices or shaders for the spheres,\n"
+                         "is named on the page and here, and left out.");
   struct Arguments {
     std::string folder, output;
   };

@@ -140,6 +140,15 @@ ParameterValues published_values(const JsonReader& result, const JsonReader& lin
   return values;
 }
 
+/// The model's parameters in each of the table's rows, as far as there is a table.
+HtmlSphere sphere_of(const Model& model, const ParameterValues& values, const Table* table, const std::string& label) {
+  HtmlSphere sphere{.label = label, .rows = {}};
+  if (!table) sphere.rows.emplace_back(values.flat().begin(), values.flat().end());
+  for (std::size_t k = 0; table && k < table->parameter_rows(); ++k)
+    sphere.rows.push_back(TableModel(model, values, *table).row(k));
+  return sphere;
+}
+
 /// Throws if the table is not that on which the result stands.
 void check_rms(const Table& table, const std::vector<float>& values, const JsonReader& line, const char* label) {
   const JsonReader domain = line.at("domain"), stated = line.at("rms").at(label);
@@ -174,13 +183,10 @@ void add_drawings(const NamedRow& named, const fs::path& folder, const JsonReade
     if (!table) remarks.push_back("The folder lacks the table of " + stem + ".fit.json: no slices of it.");
     const ParameterValues published = published_values(result, line, found->fit), refit = found->fit.values();
     const std::string label = "refit " + joined(texts(line.at("free")));
-    // The spheres show the middle of the axes.
-    const auto flat = [&](const ParameterValues& values) {
-      if (table) return TableModel(model, values, *table).row(table->parameter_rows() / 2);
-      return std::vector(values.flat().begin(), values.flat().end());
-    };
-    if (row.explorer.spheres.empty()) row.explorer.spheres.emplace_back("published", flat(published));
-    row.explorer.spheres.emplace_back(label, flat(refit));
+    add_fit_quality(found->fit, named.lines.size() > 1 ? joined(texts(line.at("free"))) : "", row);
+    if (row.explorer.spheres.empty())
+      row.explorer.spheres.push_back(sphere_of(model, published, table.get(), "published"));
+    row.explorer.spheres.push_back(sphere_of(model, refit, table.get(), label));
     row.explorer.model = &model;
     for (const std::string& name : texts(line.at("free"))) {
       if (std::ranges::find(row.explorer.fitted, name) == row.explorer.fitted.end())

@@ -69,7 +69,7 @@ std::vector<HtmlShader> folder_shaders(const fs::path& folder, const std::string
 std::optional<FolderFit> folder_fit(const fs::path& path) {
   if (!is_there(path)) return std::nullopt;
   const Json json = parse_json(read_file(path), path.string());
-  return FolderFit{Fit::from_json(json, path.string()),
+  return FolderFit{path, Fit::from_json(json, path.string()),
                    JsonReader(json, path.string()).at("provenance").at("table_sha256").text()};
 }
 

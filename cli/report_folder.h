@@ -50,10 +50,24 @@ std::vector<HtmlShader> folder_shaders(const std::filesystem::path& folder, cons
 
 /// A fit's file with the table that it was made on; nothing if the folder lacks the file. Throws Error(invalid_input).
 struct FolderFit {
+  std::filesystem::path path;
   Fit fit;
   std::string table_sha256;
 };
 std::optional<FolderFit> folder_fit(const std::filesystem::path& path);
+
+/// Every fit of a folder. Throws Error(invalid_input) for JSON that is broken, whatever it was to be.
+std::vector<std::filesystem::path> folder_fits(const std::filesystem::path& folder);
+
+/// Pages of more fits have their shaders in GLSL alone, which the spheres need, and neither slices nor references.
+inline constexpr std::size_t most_complete_fits = 8;
+
+/// A fit as a row of a page. `with_table`: against its data, where they lie as the fit found them or in its folder;
+/// throws Error(invalid_input) if they give another error than the fit's file.
+HtmlRow fit_row(const std::string& name, const FolderFit& found, bool with_table, bool all_languages,
+                const std::string& command, std::vector<std::string>& remarks);
+/// How sure a fit is: its descent, its starts, its correlation matrix. `label` tells several of one row apart.
+void add_fit_quality(const Fit& fit, const std::string& label, HtmlRow& row);
 
 /// "a, b"
 std::string joined(const std::vector<std::string>& names);
@@ -65,6 +79,14 @@ HtmlReport report_head(const JsonReader& result);
 HtmlReport constants_report(const std::filesystem::path& folder, const JsonReader& result);
 /// Of `refit` with recipes of closed forms.
 HtmlReport forms_report(const std::filesystem::path& folder, const JsonReader& result);
+/// Of `refit` with recipes of curves: every reference and albedo against each model.
+HtmlReport curves_report(const std::filesystem::path& folder, const JsonReader& result);
+/// Of `refit substrate-rules`: constants, held-out pairs, and what each shipped tree costs.
+HtmlReport substrate_report(const std::filesystem::path& folder, const JsonReader& result);
+/// Of `slab validate`, by its validation.json.
+HtmlReport slab_report(const std::filesystem::path& folder, const JsonReader& validation);
+/// Of single fits.
+HtmlReport fits_report(const std::vector<std::filesystem::path>& fits, const std::string& command);
 /// Of `fit` over several materials, by its summary.json.
 HtmlReport materials_report(const std::filesystem::path& folder, const JsonReader& summary, const std::string& command);
 

@@ -4,18 +4,12 @@
 #include <algorithm>
 
 #include "cli/report_folder.h"
-#include "cli/shader_text.h"
-#include "evaluate/shader.h"
-#include "reference/output_file.h"
 
 namespace lobefit {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Pages of more materials have their shaders in GLSL alone, which the spheres need.
-constexpr std::size_t most_with_all_languages = 8;
 
 /// A number or "–".
 std::string metric_text(const JsonReader& metrics, const std::string& name) {
@@ -53,21 +47,6 @@ HtmlTable spread_table(const JsonReader& summary) {
   return table;
 }
 
-HtmlTable parameters_table(const Fit& fit) {
-  HtmlTable table{.caption = "Parameters", .header = {"parameter", "value", "95 % interval", "range", "remark"}};
-  for (const FitParameter& p : fit.parameters) {
-    const bool interval = p.free && p.estimate.identifiable && !p.estimate.at_bound && p.estimate.standard_error > 0.0;
-    table.lines.push_back({p.name, fmt::format("{:.6g}", p.estimate.value),
-                           interval ? fmt::format("[{:.6g}, {:.6g}]", p.estimate.ci_low, p.estimate.ci_high) : "–",
-                           fmt::format("{:g} … {:g}", p.lower, p.upper),
-                           !p.free                    ? "held"
-                           : !p.estimate.identifiable ? "not identifiable"
-                           : p.estimate.at_bound      ? "at its bound"
-                                                      : ""});
-  }
-  return table;
-}
-
 }  // namespace
 
 HtmlReport materials_report(const fs::path& folder, const JsonReader& summary, const std::string& command) {
@@ -82,30 +61,23 @@ HtmlReport materials_report(const fs::path& folder, const JsonReader& summary, c
     report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
 
   FolderFigures figures(folder);
-  const bool all_languages = fits.size() <= most_with_all_languages;
+  const bool complete = fits.size() <= most_complete_fits;
   for (const JsonReader& line : fits) {
     const std::string material = line.at("material").text();
-    HtmlRow row{.name = material};
     if (const std::optional<FolderFit> found = folder_fit(folder / line.at("fit").text())) {
-      const Model& model = find_model(found->fit.model);
-      const ParameterValues values = found->fit.values();
-      row.note = fmt::format("{}; measured data with SHA-256 {}.", model.info->title, found->table_sha256);
-      row.tables = {parameters_table(found->fit)};
-      for (const std::string& language : shader_languages()) {
-        if (!all_languages && language != "glsl") continue;
-        row.shaders.push_back(
-            {language, shader_text(model, values, &found->fit, language, command, "Fitted constants of " + material)});
-      }
-      if (model.info->kind == ModelKind::brdf && !model.info->transmits)
-        row.explorer = {.model = &model, .spheres = {{"fitted", {values.flat().begin(), values.flat().end()}}}};
+      report.rows.push_back(fit_row(material, *found, complete, complete, command, report.remarks));
     } else {
+      report.rows.push_back({.name = material});
       report.remarks.push_back("The folder lacks " + line.at("fit").text() + ".");
     }
-    figures.add(material, row.figures);
-    report.rows.push_back(std::move(row));
+    figures.add(material, report.rows.back().figures);
   }
-  if (!all_languages)
-    report.remarks.push_back("`lobefit export FIT.json` writes shaders in other languages than GLSL.");
+  if (!complete) {
+    report.remarks.push_back(
+        "Of so many materials the page has neither slices nor shaders other than GLSL; `lobefit export FIT.json` "
+        "writes "
+        "them.");
+  }
   figures.add_remark(report.remarks);
   return report;
 }

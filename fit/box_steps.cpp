@@ -80,6 +80,7 @@ Minimum minimise_in_box(const LeastSquaresProblem& problem, Monitor& monitor) {
     minimum.termination = "the model has no finite value at the start";
     return minimum;
   }
+  minimum.history.push_back(std::sqrt(here.sum_of_squares));
   const double tolerance = std::max(problem.tolerance, 1e-12);  // the sums keep no more digits
   double damping = 1e-3, growth = 2.0;
   std::vector<double> x(minimum.x);
@@ -123,6 +124,7 @@ Minimum minimise_in_box(const LeastSquaresProblem& problem, Monitor& monitor) {
       damping *= growth;
       growth *= 2.0;
     }
+    minimum.history.push_back(std::sqrt(here.sum_of_squares));
   }
   minimum.sum_of_squares = here.sum_of_squares;
   minimum.termination = minimum.converged ? "no step gains more than the tolerance" : "the iterations ran out";

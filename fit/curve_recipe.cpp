@@ -864,6 +864,7 @@ Json CurveResult::json(const CurveRecipe& recipe, const std::string& command, st
       if (!p.free) fixed[p.name] = p.estimate.value;
     }
     Json line{{"model", own.model->model},
+              {"table", own.reference->name},
               {"reference", reference},
               {"domain", domain},
               {"method", "exact"},
@@ -897,6 +898,7 @@ Json CurveResult::json(const CurveRecipe& recipe, const std::string& command, st
       curves[curve.parameter] = {{"coefficients", curve.coefficients}, {"lower", curve.lower}, {"upper", curve.upper}};
     }
     curve_list.push_back({{"model", own.model->model},
+                          {"table", own.reference->name},
                           {recipe.contested_name, tangent(own.contested_free)},
                           {"bounces", bounces_json(*own.reference)},
                           {"albedo", own.albedo},
@@ -922,6 +924,8 @@ Json CurveResult::json(const CurveRecipe& recipe, const std::string& command, st
   }
   return {{"recipe", recipe.name},
           {"title", recipe.title},
+          {"description", recipe.description},
+          {"contested", recipe.contested_name},
           {"rows", row_list},
           {"curves", curve_list},
           {"comparisons", comparison_list},

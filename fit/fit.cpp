@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 
@@ -93,15 +94,23 @@ bool is_better(const Minimum& a, const Minimum& b) {
   return a.sum_of_squares < b.sum_of_squares || (std::isfinite(a.sum_of_squares) && std::isnan(b.sum_of_squares));
 }
 
+std::vector<double> misfits_of(const std::vector<Minimum>& minima) {
+  std::vector<double> misfits;
+  for (const Minimum& minimum : minima) misfits.push_back(std::sqrt(minimum.sum_of_squares));
+  return misfits;
+}
+
 /// Stage by stage from a guess over a coarse sample, the better half on over a finer one.
 std::vector<Minimum> staged_minima(const Samples& samples, const ParameterValues& values, const Table& table,
-                                   const FitOptions& options, double& misfit, Monitor& monitor) {
+                                   const FitOptions& options, double& misfit, std::vector<double>& start_misfits,
+                                   Monitor& monitor) {
   const ParameterValues guessed = with_guess(values, guess_material(table, samples.fine_weights));
   std::vector<Minimum> minima(static_cast<std::size_t>(options.starts));
   tbb::parallel_for(std::size_t{0}, minima.size(), [&](std::size_t index) {
     minima[index] = staged_start(samples.coarse_or_fine(), guessed, options, static_cast<int>(index), monitor);
     monitor.advance(1);
   });
+  start_misfits = misfits_of(minima);
   std::ranges::stable_sort(minima, is_better);
   minima.resize(std::max<std::size_t>(std::min<std::size_t>(minima.size(), 2), minima.size() / 2));
   misfit = std::sqrt(minima.front().sum_of_squares);
@@ -126,7 +135,7 @@ std::vector<Minimum> staged_minima(const Samples& samples, const ParameterValues
 
 /// The best minimum of all starts.
 Minimum search(const Samples& samples, const ParameterValues& values, const Table& table, const FitOptions& options,
-               Monitor& monitor) {
+               std::vector<double>& start_misfits, Monitor& monitor) {
   const FitVariables& variables = samples.whole.variables();
   const bool staged = options.staged && !variables.names.empty();
   double misfit = 0.0;
@@ -139,7 +148,7 @@ Minimum search(const Samples& samples, const ParameterValues& values, const Tabl
   };
   std::vector<Minimum> minima;
   if (staged) {
-    minima = staged_minima(samples, values, table, options, misfit, monitor);
+    minima = staged_minima(samples, values, table, options, misfit, start_misfits, monitor);
   } else {
     minima.resize(variables.names.empty() ? 1 : static_cast<std::size_t>(options.starts));
     tbb::parallel_for(std::size_t{0}, minima.size(), [&](std::size_t index) {
@@ -149,6 +158,7 @@ Minimum search(const Samples& samples, const ParameterValues& values, const Tabl
       minima[index] = minimise(start, monitor);
       monitor.advance(1);
     });
+    start_misfits = misfits_of(minima);
     std::ranges::stable_sort(minima, is_better);
   }
   if (staged || samples.fine) {
@@ -361,7 +371,7 @@ Fit fit(const Model& model, const ParameterValues& values, const Table& table, c
   result.starts_tried = problem.variables().names.empty() ? 1 : options.starts;
   result.starts_tried += static_cast<int>(options.also_from.size());
   monitor.begin("fit " + result.model, static_cast<std::uint64_t>(result.starts_tried));
-  const Minimum best = search(samples, values, table, options, monitor);
+  const Minimum best = search(samples, values, table, options, result.start_misfits, monitor);
   monitor.end();
   // Where a misfit makes the intervals, a sample knows the curvature well enough; where noise does, the sample's own
   // would count.
@@ -419,6 +429,17 @@ Json estimate_json(const FitParameter& p) {
           {"identifiable", p.estimate.identifiable}};
 }
 
+namespace {
+
+/// JSON has no infinity: where a model has no finite value, null.
+Json finite_json(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(std::isfinite(value) ? Json(value) : Json());
+  return list;
+}
+
+}  // namespace
+
 Json Fit::json(const std::string& command, const std::string& table_sha256) const {
   Json list = Json::array();
   for (const FitParameter& p : parameters) {
@@ -443,6 +464,8 @@ Json Fit::json(const std::string& command, const std::string& table_sha256) cons
        {{"converged", solution.converged},
         {"iterations", solution.iterations},
         {"starts", starts_tried},
+        {"start_misfits", finite_json(start_misfits)},
+        {"history", finite_json(solution.history)},
         {"entries", entries},
         {"intervals", intervals_names[static_cast<std::size_t>(options.intervals)]},
         {"message", solution.termination},
@@ -454,6 +477,31 @@ Json Fit::json(const std::string& command, const std::string& table_sha256) cons
   if (!mappings.empty()) document["map"] = mapping_list;
   return document;
 }
+
+namespace {
+
+/// Throws unless it is square, a line per free parameter.
+std::vector<std::vector<double>> correlation_of(const JsonReader& fit, const std::vector<FitParameter>& parameters) {
+  const JsonReader list = fit.at("correlation");
+  const auto free = static_cast<std::size_t>(std::ranges::count_if(parameters, &FitParameter::free));
+  std::vector<std::vector<double>> lines;
+  for (const JsonReader& line : list.elements()) lines.push_back(line.numbers());
+  const bool square = std::ranges::all_of(lines, [&](const auto& line) { return line.size() == free; });
+  if (lines.size() != free || !square) {
+    throw list.error(fmt::format("{} parameters are free: expected as many lines and columns", free), "fit again");
+  }
+  return lines;
+}
+
+/// Null is infinity.
+std::vector<double> numbers_or_infinity(const JsonReader& list) {
+  std::vector<double> values;
+  for (const JsonReader& element : list.elements())
+    values.push_back(element.value().is_null() ? std::numeric_limits<double>::infinity() : element.number());
+  return values;
+}
+
+}  // namespace
 
 Fit Fit::from_json(const Json& json, const std::string& place) {
   const JsonReader reader(json, place);
@@ -476,6 +524,12 @@ Fit Fit::from_json(const Json& json, const std::string& place) {
       parameter.estimate.at_bound = element.at("at_bound").boolean();
       parameter.estimate.identifiable = !element.has("identifiable") || element.at("identifiable").boolean();
       result.parameters.push_back(parameter);
+    }
+    if (reader.has("correlation")) result.solution.correlation = correlation_of(reader, result.parameters);
+    if (reader.has("solver")) {
+      const JsonReader solver = reader.at("solver");
+      if (solver.has("history")) result.solution.history = numbers_or_infinity(solver.at("history"));
+      if (solver.has("start_misfits")) result.start_misfits = numbers_or_infinity(solver.at("start_misfits"));
     }
     if (reader.has("map")) {
       for (const JsonReader& m : reader.at("map").elements()) {

@@ -93,7 +93,8 @@ struct Fit {
   LeastSquaresSolution solution;   // its variables are the free ones of `parameters`, in their order
   FitOptions options;
   int starts_tried = 1;
-  std::size_t entries = 0;  // that were fitted
+  std::vector<double> start_misfits;  // √Σr² at the minimum of each start, over the entries that starts run on
+  std::size_t entries = 0;            // that were fitted
 
   /// The fitted values, ready to evaluate.
   ParameterValues values() const;

@@ -118,13 +118,16 @@ class Block : public ceres::CostFunction {
   std::size_t first_, count_, variables_;
 };
 
-/// Stops the solver when the user asks, when an evaluation has failed, or when a variable is pressed against a bound
-/// that does not hold it yet.
+/// Keeps the history. Stops the solver when the user asks, when an evaluation has failed, or when a variable is pressed
+/// against a bound that does not hold it yet.
 class Watch : public ceres::IterationCallback {
  public:
-  Watch(const Cache& cache, const std::vector<int>& held) : cache_(cache), held_(held) {}
+  Watch(const Cache& cache, const std::vector<int>& held, std::vector<double>& history)
+      : cache_(cache), held_(held), history_(history) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
     if (cache_.failure) return ceres::SOLVER_ABORT;
+    // Later passes begin where the one before ended.
+    if (iteration.iteration > 0 || history_.empty()) history_.push_back(std::sqrt(2.0 * iteration.cost));
     if (!iteration.step_is_successful) return ceres::SOLVER_CONTINUE;
     for (std::size_t i = 0; i < held_.size(); ++i) {
       if (held_[i] == 0 && cache_.pressed(i) != 0) return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
@@ -135,6 +138,7 @@ class Watch : public ceres::IterationCallback {
  private:
   const Cache& cache_;
   const std::vector<int>& held_;
+  std::vector<double>& history_;
 };
 
 /// Names the direction v of variable space: "0.8 a - 0.6 b".
@@ -230,6 +234,7 @@ LeastSquaresSolution analyse(const LeastSquaresProblem& problem, const Minimum& 
   solution.converged = minimum.converged;
   solution.iterations = minimum.iterations;
   solution.termination = minimum.termination;
+  solution.history = minimum.history;
   for (const double value : x) solution.variables.push_back({.value = value, .ci_low = value, .ci_high = value});
   const NormalEquations equations = normal_equations(problem, x);
   const Eigen::Map<const RowMatrix> normal(equations.normal.data(), p, p);
@@ -381,7 +386,7 @@ Minimum minimise(const LeastSquaresProblem& problem, Monitor& monitor) {
         options.num_threads = 1;
         options.logging_type = ceres::SILENT;
         options.update_state_every_iteration = true;
-        Watch watch(cache, held);
+        Watch watch(cache, held, solution.history);
         options.callbacks.push_back(&watch);
         ceres::Solver::Summary summary;
         ceres::Solve(options, &ceres_problem, &summary);

@@ -69,6 +69,7 @@ struct LeastSquaresSolution {
   bool identifiable = true;
   int iterations = 0;
   std::string termination;           // Ceres' own words
+  std::vector<double> history;       // √Σr² at the start and after each iteration
   std::vector<std::string> remarks;  // what a person should know: bounds, directions that the data don't decide
 };
 
@@ -81,6 +82,7 @@ struct Minimum {
   bool converged = false;
   int iterations = 0;
   std::string termination;
+  std::vector<double> history;  // √Σr² at the start and after each iteration
 };
 /// The minimum alone.
 Minimum minimise(const LeastSquaresProblem& problem, Monitor& monitor);

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 
+#include "report/html_chart.h"
 #include "report/html_page.h"
 #include "report/html_values.h"
 
@@ -21,20 +22,6 @@ constexpr std::size_t small_array_bytes = 20'000;
 
 /// A conclusion of more bytes would push everything else off the first screen.
 constexpr std::size_t longest_open_conclusion = 1000;
-
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&': result += "&amp;"; break;
-      case '<': result += "&lt;"; break;
-      case '>': result += "&gt;"; break;
-      case '"': result += "&quot;"; break;
-      default: result += c;
-    }
-  }
-  return result;
-}
 
 /// JSON that can stand in a script element: no text in it can end the element or open a comment.
 std::string script_json(const Json& json) {
@@ -106,12 +93,20 @@ std::string figure_html(const HtmlFigure& figure) {
          escaped(figure.title) + "</figcaption></figure>\n";
 }
 
+std::string charts_html(const std::vector<HtmlChart>& charts) {
+  std::string html;
+  for (const HtmlChart& chart : charts) html += chart_html(chart);
+  return html.empty() ? "" : "<div class=\"charts\">\n" + html + "</div>\n";
+}
+
 std::string row_html(const HtmlRow& row, std::size_t number) {
   const std::string id = fmt::format("row-{}", number);
   std::string html = fmt::format("<article class=\"row\" id=\"{0}\" aria-labelledby=\"{0}-title\">\n", id);
   html += "<h3 id=\"" + id + "-title\">" + escaped(row.name) + "</h3>\n";
   if (!row.note.empty()) html += "<p class=\"note row-note\">" + escaped(row.note) + "</p>\n";
   for (const HtmlTable& table : row.tables) html += table_html(table, "h4");
+  html += charts_html(row.charts);
+  for (const HtmlMatrix& matrix : row.matrices) html += matrix_html(matrix);
   if (!row.shaders.empty()) {
     html += "<section class=\"shaders\"><h4>Shader</h4>\n";
     for (const HtmlShader& shader : row.shaders) {
@@ -137,7 +132,54 @@ std::string row_label(const Table& table, std::size_t row) {
   return label;
 }
 
-/// Arrays of the page, each once; and which parameter rows of each table are kept.
+/// Which parameter rows and angles of a table are kept.
+struct KeptEntries {
+  std::vector<std::size_t> rows, theta_o, theta_i, phi;
+
+  std::size_t count() const { return rows.size() * theta_o.size() * theta_i.size() * phi.size(); }
+  /// The table's entry at place k of [row][theta_o][theta_i][phi].
+  std::size_t entry(const Table& table, std::size_t k) const {
+    const std::size_t p = k % phi.size(), i = k / phi.size() % theta_i.size(),
+                      o = k / phi.size() / theta_i.size() % theta_o.size(),
+                      row = k / phi.size() / theta_i.size() / theta_o.size();
+    return (rows[row] * table.lines_per_parameter() + theta_o[o]) * table.width() + theta_i[i] * table.grid.phi.size() +
+           phi[p];
+  }
+};
+
+/// Every stride-th of n, and the last.
+std::vector<std::size_t> strided(std::size_t n, std::size_t stride) {
+  std::vector<std::size_t> kept;
+  for (std::size_t k = 0; k < n; k += stride) kept.push_back(k);
+  if (kept.back() != n - 1) kept.push_back(n - 1);
+  return kept;
+}
+
+/// About a share of the table's entries: parameter rows evenly spread, both ends included; where two are still too
+/// many, angles too.
+KeptEntries kept_entries(const Table& table, double share) {
+  const std::size_t all = table.parameter_rows();
+  const auto count =
+      std::clamp(static_cast<std::size_t>(share * static_cast<double>(all)), std::min<std::size_t>(all, 2), all);
+  KeptEntries kept;
+  for (std::size_t k = 0; k < count; ++k) kept.rows.push_back(count == 1 ? 0 : k * (all - 1) / (count - 1));
+  const double most = std::max(1.25 * share, 1e-9) * static_cast<double>(table.entries());
+  for (std::size_t step = 0;; ++step) {
+    kept.phi = strided(table.grid.phi.size(), 1 + (step + 2) / 3);
+    kept.theta_i = strided(table.grid.theta_i.size(), 1 + (step + 1) / 3);
+    kept.theta_o = strided(table.grid.theta_o.size(), 1 + step / 3);
+    // Two values an axis are the least.
+    if (static_cast<double>(kept.count()) <= most || kept.count() <= kept.rows.size() * 8) return kept;
+  }
+}
+
+std::vector<double> values_at(const std::vector<double>& values, const std::vector<std::size_t>& places) {
+  std::vector<double> result;
+  for (const std::size_t place : places) result.push_back(values[place]);
+  return result;
+}
+
+/// Arrays of the page, each once; and what of each table is kept.
 class PackedTables {
  public:
   explicit PackedTables(const std::vector<HtmlRow>& rows) {
@@ -156,6 +198,9 @@ class PackedTables {
 
   bool leaves_out() const { return left_out_; }
   const Json& arrays() const { return arrays_; }
+  KeptEntries kept(const Table& table) const {
+    return kept_entries(table, bytes_of(table) <= small_array_bytes ? 1.0 : share_);
+  }
 
   Json slices(const HtmlSlices& slices) {
     const Table& table = *slices.reference;
@@ -163,22 +208,23 @@ class PackedTables {
       throw Error(ExitCode::usage, "slices need a table over polar angles", slices.label,
                   "resample the table on a grid first");
     }
-    const std::vector<std::size_t> rows = kept_rows(table);
-    std::vector<float> reference = of_rows(table, table.values, rows);
+    const KeptEntries places = kept(table);
+    left_out_ = left_out_ || places.count() < table.entries();
+    std::vector<float> reference = at_places(table, table.values, places);
     for (std::size_t k = 0; k < reference.size(); ++k) {
-      if (!table.valid[entry_of(table, rows, k)]) reference[k] = std::nanf("");
+      if (!table.valid[places.entry(table, k % places.count())]) reference[k] = std::nanf("");
     }
     Json labels = Json::array(), lines = Json::array();
-    for (const std::size_t row : rows) labels.push_back(row_label(table, row));
+    for (const std::size_t row : places.rows) labels.push_back(row_label(table, row));
     const std::size_t packed = add(reference);
     for (const HtmlLine& line : slices.lines) {
-      std::vector<float> difference = of_rows(table, line.values, rows);
+      std::vector<float> difference = at_places(table, line.values, places);
       for (std::size_t k = 0; k < difference.size(); ++k) difference[k] -= reference[k];
       lines.push_back({{"label", line.label}, {"difference", add(difference)}});
     }
-    return {{"theta_i", table.grid.theta_i.values},
-            {"theta_o", table.grid.theta_o.values},
-            {"phi", table.grid.phi.values},
+    return {{"theta_i", values_at(table.grid.theta_i.values, places.theta_i)},
+            {"theta_o", values_at(table.grid.theta_o.values, places.theta_o)},
+            {"phi", values_at(table.grid.phi.values, places.phi)},
             {"rows", labels},
             {"channels", table.channels},
             {"quantity", quantity_names[static_cast<std::size_t>(slices.quantity)]},
@@ -190,30 +236,11 @@ class PackedTables {
  private:
   static std::size_t bytes_of(const Table& table) { return table.values.size() * 8 / 3; }
 
-  /// Evenly spread, both ends included.
-  std::vector<std::size_t> kept_rows(const Table& table) {
-    const std::size_t all = table.parameter_rows();
-    const double share = bytes_of(table) <= small_array_bytes ? 1.0 : share_;
-    const auto kept =
-        std::clamp(static_cast<std::size_t>(share * static_cast<double>(all)), std::min<std::size_t>(all, 2), all);
-    left_out_ = left_out_ || kept < all;
-    std::vector<std::size_t> rows;
-    for (std::size_t k = 0; k < kept; ++k) rows.push_back(kept == 1 ? 0 : k * (all - 1) / (kept - 1));
-    return rows;
-  }
-
-  static std::size_t entry_of(const Table& table, const std::vector<std::size_t>& rows, std::size_t k) {
-    const std::size_t per_row = table.entries() / table.parameter_rows(), at = k % (rows.size() * per_row);
-    return rows[at / per_row] * per_row + at % per_row;
-  }
-
-  /// [channel][row][theta_o][theta_i][phi] of the rows kept.
-  static std::vector<float> of_rows(const Table& table, const std::vector<float>& values,
-                                    const std::vector<std::size_t>& rows) {
-    const std::size_t per_channel = rows.size() * table.entries() / table.parameter_rows();
-    std::vector<float> result(per_channel * static_cast<std::size_t>(table.channels));
+  /// [channel][row][theta_o][theta_i][phi] of what is kept.
+  static std::vector<float> at_places(const Table& table, const std::vector<float>& values, const KeptEntries& places) {
+    std::vector<float> result(places.count() * static_cast<std::size_t>(table.channels));
     for (std::size_t k = 0; k < result.size(); ++k)
-      result[k] = values[k / per_channel * table.entries() + entry_of(table, rows, k)];
+      result[k] = values[k / places.count() * table.entries() + places.entry(table, k % places.count())];
     return result;
   }
 
@@ -231,30 +258,40 @@ class PackedTables {
   std::map<std::pair<double, std::string>, std::size_t> numbers_;
 };
 
-Json explorer_json(const HtmlExplorer& explorer) {
-  const auto flat_json = [](const ParameterInfo& info, const std::vector<double>& flat) {
-    const auto first = flat.begin() + info.offset;
-    return Json(std::vector<double>(first, first + info.components));
-  };
+/// Values of parameters as [parameter row of `kept`][sphere][component].
+Json explorer_json(const HtmlExplorer& explorer, const std::vector<std::size_t>& kept) {
   Json parameters = Json::array();
   for (const ParameterInfo& info : explorer.model->parameters) {
     if (info.components == 0) continue;
-    Json values = Json::array();
-    for (const auto& [label, flat] : explorer.spheres) values.push_back(flat_json(info, flat));
-    const bool apart = std::ranges::find(explorer.fitted, info.name) != explorer.fitted.end() ||
-                       std::ranges::any_of(values, [&](const Json& value) { return value != values.front(); });
+    bool apart = std::ranges::find(explorer.fitted, info.name) != explorer.fitted.end();
+    // Fits may leave a parameter's own range where they were told to.
+    double lower = info.lower, upper = info.upper;
+    Json rows = Json::array();
+    for (const std::size_t row : kept) {
+      Json values = Json::array();
+      for (const HtmlSphere& sphere : explorer.spheres) {
+        const std::vector<double>& flat = sphere.rows[std::min(row, sphere.rows.size() - 1)];
+        const auto first = flat.begin() + info.offset;
+        const std::vector<double> components(first, first + info.components);
+        lower = std::min(lower, std::ranges::min(components));
+        upper = std::max(upper, std::ranges::max(components));
+        values.push_back(components);
+      }
+      apart = apart || std::ranges::any_of(values, [&](const Json& value) { return value != values.front(); });
+      rows.push_back(std::move(values));
+    }
     parameters.push_back({{"name", info.name},
                           {"symbol", info.symbol},
                           {"unit", info.unit},
                           {"doc", info.doc},
-                          {"lower", info.lower},
-                          {"upper", info.upper},
+                          {"lower", lower},
+                          {"upper", upper},
                           {"choices", std::vector<std::string>(info.choices.begin(), info.choices.end())},
                           {"apart", apart},
-                          {"values", values}});
+                          {"values", rows}});
   }
   Json labels = Json::array();
-  for (const auto& [label, flat] : explorer.spheres) labels.push_back(label);
+  for (const HtmlSphere& sphere : explorer.spheres) labels.push_back(sphere.label);
   return {{"model", explorer.model->info->name}, {"spheres", labels}, {"parameters", parameters}};
 }
 
@@ -290,18 +327,21 @@ std::string html_report(HtmlReport report) {
   Json rows = Json::array();
   std::string row_texts, tables;
   for (const HtmlTable& table : report.tables) tables += table_html(table, "h2");
+  tables += charts_html(report.charts);
   for (std::size_t k = 0; k < report.rows.size(); ++k) {
     const HtmlRow& row = report.rows[k];
     row_texts += row_html(row, k);
+    const Table* const table = row.slices.reference.get();
+    const std::vector<std::size_t> kept = table ? packed.kept(*table).rows : std::vector<std::size_t>{0};
     rows.push_back({{"name", row.name},
                     {"note", row.note},
-                    {"slices", row.slices.reference ? packed.slices(row.slices) : Json()},
-                    {"explorer", row.explorer.model ? explorer_json(row.explorer) : Json()}});
+                    {"slices", table ? packed.slices(row.slices) : Json()},
+                    {"explorer", row.explorer.model ? explorer_json(row.explorer, kept) : Json()}});
   }
   if (packed.leaves_out()) {
     report.remarks.push_back(
-        "To keep the page small, slices and residuals show some of the tables' parameter rows, evenly spread; the "
-        "tables hold them all.");
+        "To keep the page small, slices, residuals and references show some of the tables' parameter rows and angles, "
+        "evenly spread; the tables hold them all.");
   }
   return filled(html_page.text, {{"title", escaped(report.title)},
                                  {"style", std::string(html_page.style)},

@@ -27,6 +27,27 @@ struct HtmlTable {
   std::string note;
 };
 
+/// Numbers from -1 to 1 between things of the same names, shaded by their size.
+struct HtmlMatrix {
+  std::string caption;
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> values;  // square
+  std::string note;
+};
+
+/// Numbers against a number, drawn when the page is made: no control.
+struct HtmlChart {
+  struct Line {
+    std::string label;
+    std::vector<std::pair<double, double>> points;  // what is not finite is left out
+    bool joined = true;                             // else points alone
+  };
+  std::string title, horizontal, vertical;
+  bool logarithmic = false;  // the vertical axis; what is not positive is left out
+  std::vector<Line> lines;
+  std::string note;
+};
+
 /// A picture, its file's bytes.
 struct HtmlFigure {
   std::string title;
@@ -53,11 +74,18 @@ struct HtmlSlices {
   std::vector<HtmlLine> lines;
 };
 
-/// Lit spheres side by side, drawn by the row's GLSL text, which must define `vec3 Lobefit_NAME(wi, wo, parameters)`.
+/// A set of constants to be shown: the model's flat parameters in each parameter row of the slices' table, or one set
+/// for all.
+struct HtmlSphere {
+  std::string label;
+  std::vector<std::vector<double>> rows;
+};
+
+/// Lit spheres, polar lobes and image slices, drawn by the row's GLSL text, which must define
+/// `vec3 Lobefit_NAME(wi, wo, parameters)`; beside them the slices' reference.
 struct HtmlExplorer {
   const Model* model = nullptr;
-  /// One sphere each: a label, and the model's flat parameters. Those that all spheres share have one slider.
-  std::vector<std::pair<std::string, std::vector<double>>> spheres;
+  std::vector<HtmlSphere> spheres;  // parameters that all of them share have one slider
   /// Parameters that differ by meaning: they have a slider per sphere even where values agree.
   std::vector<std::string> fitted;
 };
@@ -66,6 +94,8 @@ struct HtmlExplorer {
 struct HtmlRow {
   std::string name, note;
   std::vector<HtmlTable> tables;
+  std::vector<HtmlMatrix> matrices;
+  std::vector<HtmlChart> charts;
   HtmlSlices slices;      // without a reference: none
   HtmlExplorer explorer;  // without a model: none
   std::vector<HtmlShader> shaders;
@@ -75,6 +105,7 @@ struct HtmlRow {
 struct HtmlReport {
   std::string title, description, conclusion, command;
   std::vector<HtmlTable> tables;
+  std::vector<HtmlChart> charts;
   std::vector<HtmlRow> rows;
   std::vector<std::pair<std::string, std::string>> provenance;
   /// What the folder lacks, or the page leaves out.
@@ -83,7 +114,7 @@ struct HtmlReport {
 
 /// The page. Tables are kept with three significant digits (half precision; differences to the reference apart, so that
 /// residuals have three digits of their own), and where all of them together are large, with evenly spread parameter
-/// rows; remarks then say so. Throws Error(usage) for slices of a table that is not spherical.
+/// rows and angles; remarks then say so. Throws Error(usage) for slices of a table that is not spherical.
 std::string html_report(HtmlReport report);
 
 }  // namespace lobefit

@@ -1,4 +1,4 @@
-// Numbers of a table as a page carries them: half precision, in base64.
+// Texts and numbers as a page carries them: escaped; in half precision and base64.
 #pragma once
 
 #include <span>
@@ -6,6 +6,9 @@
 #include <string_view>
 
 namespace lobefit {
+
+/// Text as markup: in an element or a quoted attribute.
+std::string escaped(std::string_view text);
 
 /// Of any bytes (RFC 4648).
 std::string base64(std::string_view bytes);

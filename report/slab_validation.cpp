@@ -281,7 +281,7 @@ Json stage_json(const SlabTree& tree, const ValidatedStage& stage) {
 }  // namespace
 
 Json SlabValidation::json(const Json& provenance) const {
-  Json json = Json::object();
+  Json json{{"title", tree.title}};
   Json all = Json::object();
   for (const ValidatedStrategy& strategy : strategies) {
     Json stages = Json::array();

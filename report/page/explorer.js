@@ -1,70 +1,26 @@
-// Spheres side by side, lit by one light, drawn by the row's exported GLSL.
-//
-// The text is that of `lobefit export`, unchanged: it is GLSL 4.50 and OpenGL ES 3.00 at once, but for the precision
-// that stands before it. World and samples are those of `lobefit sphere`: x right, y up, z towards the viewer, four
-// samples per pixel, π f cos under one white light, 8-bit sRGB.
-
-const vertexShader = `#version 300 es
-void main() {
-    vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-    gl_Position = vec4(corner, 0.0, 1.0);
-}`;
-
-const fragmentShader = (text, model) => `#version 300 es
-precision highp float;
-precision highp int;
-${text}
-uniform Lobefit_${model}_Parameters parameters;
-uniform vec3 light;
-uniform float exposure;
-uniform vec2 corner;
-uniform float side;
-out vec4 colour;
-
-vec3 encode(vec3 linear) {
-    vec3 c = clamp(linear, 0.0, 1.0);
-    return mix(1.055 * pow(max(c, 1e-6), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
-}
-
-void main() {
-    vec3 sum = vec3(0.0);
-    float cover = 0.0;
-    for (int k = 0; k < 4; ++k) {
-        vec2 at = gl_FragCoord.xy - corner + vec2(float(k % 2) * 0.5 - 0.25, float(k / 2) * 0.5 - 0.25);
-        vec2 p = 2.0 * at / side - 1.0;
-        float radius2 = dot(p, p);
-        if (radius2 >= 1.0) continue;
-        vec3 z = vec3(p, sqrt(1.0 - radius2));
-        vec3 x = normalize(vec3(z.z, 0.0, -z.x));
-        mat3 frame = mat3(x, cross(z, x), z);
-        vec3 wi = light * frame;
-        cover += 1.0;
-        if (wi.z > 0.0) sum += Lobefit_${model}(wi, vec3(0.0, 0.0, 1.0) * frame, parameters) * wi.z;
-    }
-    vec3 radiance = cover > 0.0 ? exposure * 3.14159265 * sum / cover : vec3(0.0);
-    colour = vec4(encode(radiance), 1.0) * (cover / 4.0);
-}`;
+// The explorer: spheres side by side under one light, polar lobes and image slices, and sliders for the parameters. Where
+// the row has slices over both angles, their reference stands beside the models, and what the models miss of it.
 
 const explorerPanel = {
   explorer: null,
 
   start() {
-    const canvas = byId('spheres');
-    for (const id of ['light-theta', 'light-phi', 'exposure']) byId(id).addEventListener('input', () => this.draw());
+    const spheres = byId('spheres');
+    for (const id of ['light-theta', 'light-phi', 'exposure', 'lobe-theta', 'lobe-scale', 'image-axis'])
+      byId(id).addEventListener('input', () => this.draw());
     byId('reset').addEventListener('click', () => {
-      byId('light-theta').value = 45;
-      byId('light-phi').value = 135;
-      byId('exposure').value = 0;
-      this.show(this.explorer, this.text);
+      for (const [id, value] of Object.entries({ 'light-theta': 45, 'light-phi': 135, exposure: 0, 'lobe-theta': 45 }))
+        byId(id).value = value;
+      this.chooseRow(this.row);
     });
-    canvas.addEventListener('pointerdown', (event) => {
-      canvas.setPointerCapture(event.pointerId);
+    spheres.addEventListener('pointerdown', (event) => {
+      if (event.target instanceof HTMLCanvasElement) event.target.setPointerCapture(event.pointerId);
       this.turn(event);
     });
-    canvas.addEventListener('pointermove', (event) => {
-      if (canvas.hasPointerCapture(event.pointerId)) this.turn(event);
+    spheres.addEventListener('pointermove', (event) => {
+      if (event.target.hasPointerCapture(event.pointerId)) this.turn(event);
     });
-    canvas.addEventListener('keydown', (event) => {
+    spheres.addEventListener('keydown', (event) => {
       const [id, step] = {
         ArrowLeft: ['light-phi', 5], ArrowRight: ['light-phi', -5], ArrowUp: ['light-theta', 5], ArrowDown: ['light-theta', -5],
       }[event.key] ?? [];
@@ -74,96 +30,116 @@ const explorerPanel = {
       input.value = id === 'light-phi' ? (value + 360) % 360 : value;
       this.draw();
     });
-    new ResizeObserver(() => this.explorer && this.draw()).observe(canvas.parentElement);
+    let width = 0;
+    new ResizeObserver(() => {
+      if (this.explorer && spheres.clientWidth !== width) this.draw();
+      width = spheres.clientWidth;
+    }).observe(spheres);
   },
 
-  show(explorer, text) {
+  show(explorer, text, slices) {
     byId('explorer').hidden = !explorer;
     this.explorer = explorer;
     if (!explorer) return;
-    const changed = this.text !== text || !this.program;
-    this.text = text;
+    // A reference of one view says nothing of the others.
+    this.slices = slices && slices.theta_o.length > 1 && slices.theta_i.length > 1 ? slices : null;
+    if (this.text !== text || !brdfs.program) {
+      this.text = text;
+      const failure = brdfs.compile(text, explorer.model);
+      this.failed = failure !== null;
+      byId('explorer-failure').textContent = failure ?? '';
+      byId('explorer-failure').hidden = !this.failed;
+      byId('explorer-pictures').hidden = this.failed;
+    }
+    this.makePanels();
+    this.chooseRow(slices ? slicePanel.place().row : 0);
+  },
+
+  /** A picture per model, the reference, and a difference per model. */
+  makePanels() {
+    const { spheres } = this.explorer;
+    this.panels = spheres.map((label, sphere) => ({ shown: 'model', sphere, label }));
+    if (this.slices) {
+      this.panels.push({ shown: 'reference', sphere: 0, label: this.slices.label });
+      this.panels.push(...spheres.map((label, sphere) => ({ shown: 'difference', sphere, label: `${label} − reference` })));
+    }
+    for (const id of ['spheres', 'image-slices']) {
+      byId(id).replaceChildren(...this.panels.map(({ label }) =>
+          make('figure', {}, make('canvas', { role: 'img', 'aria-label': label }), make('figcaption', {}, label))));
+    }
+    byId('difference-note').hidden = !this.slices;
+  },
+
+  /** Parameters and reference of one parameter row, as the page has them. */
+  chooseRow(row) {
+    if (!this.explorer) return;
+    this.row = row;
     // [parameter][sphere][component]
-    this.values = explorer.parameters.map((parameter) => parameter.values.map((value) => [...value]));
+    this.values = this.explorer.parameters.map(
+        (parameter) => parameter.values[Math.min(row, parameter.values.length - 1)].map((value) => [...value]));
     this.makeControls();
-    if (changed) this.compile();
+    if (this.failed) return;
+    brdfs.setReference(this.slices, row);
+    byId('reference-note').textContent = this.slices ?
+        `The reference is ${this.slices.label}${this.slices.rows[row] ? ', ' + this.slices.rows[row] : ''}: ` +
+        'linear between the angles of its table; the row follows the slider Parameters above.' : '';
     this.draw();
   },
 
-  fail(message) {
-    this.program = null;
-    byId('explorer-failure').textContent = message;
-    byId('explorer-failure').hidden = false;
-    byId('spheres').hidden = true;
-  },
-
-  compile() {
-    const gl = this.gl ??= byId('spheres').getContext('webgl2', { antialias: false });
-    if (!gl) return this.fail('This browser offers no WebGL 2, which the spheres are drawn with.');
-    const program = gl.createProgram();
-    const sources = [[gl.VERTEX_SHADER, vertexShader], [gl.FRAGMENT_SHADER, fragmentShader(this.text, this.explorer.model)]];
-    for (const [type, source] of sources) {
-      const shader = gl.createShader(type);
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) return this.fail(gl.getShaderInfoLog(shader));
-      gl.attachShader(program, shader);
-      gl.deleteShader(shader);
-    }
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) return this.fail(gl.getProgramInfoLog(program));
-    if (this.program) gl.deleteProgram(this.program);
-    this.program = program;
-    byId('explorer-failure').hidden = true;
-    byId('spheres').hidden = false;
-  },
-
-  /** Spheres across, and their side in CSS pixels. */
-  layout() {
-    const count = this.explorer.spheres.length;
-    const width = Math.min(byId('spheres').parentElement.clientWidth, 960);
-    const across = Math.min(count, Math.max(1, Math.floor(width / 130)));
-    return { across, down: Math.ceil(count / across), side: Math.floor(Math.min(width / across, 360)) };
-  },
-
   draw() {
-    byId('light-theta-value').textContent = byId('light-theta').value;
-    byId('light-phi-value').textContent = byId('light-phi').value;
-    byId('exposure-value').textContent = byId('exposure').value.replace('-', '−');
-    if (!this.program) return;
-    const gl = this.gl, canvas = byId('spheres'), { across, down, side } = this.layout();
-    const pixels = Math.round(side * (window.devicePixelRatio || 1));
-    canvas.width = across * pixels;
-    canvas.height = down * pixels;
-    canvas.style.width = `${across * side}px`;
-    byId('captions').style.cssText = `grid-template-columns: repeat(${across}, 1fr); width: ${across * side}px`;
-    byId('captions').replaceChildren(...this.explorer.spheres.map((label) => make('span', {}, label)));
-    gl.useProgram(this.program);
-    const at = (name) => gl.getUniformLocation(this.program, name);
+    const minus = (text) => text.replace('-', '−');
+    for (const id of ['light-theta', 'light-phi', 'exposure']) byId(`${id}-value`).textContent = minus(byId(id).value);
+    byId('lobe-theta-value').textContent = `${byId('lobe-theta').value}°`;
+    if (this.failed) return;
+    this.drawPanels('spheres', 'sphere');
+    this.drawPanels('image-slices', 'image');
+    this.drawLobes();
+  },
+
+  drawPanels(id, view) {
     const theta = byId('light-theta').value * Math.PI / 180, phi = byId('light-phi').value * Math.PI / 180;
-    gl.uniform3f(at('light'), Math.sin(theta) * Math.cos(phi), Math.sin(theta) * Math.sin(phi), Math.cos(theta));
-    gl.uniform1f(at('exposure'), 2 ** byId('exposure').value);
-    gl.uniform1f(at('side'), pixels);
-    this.explorer.spheres.forEach((_, sphere) => {
-      const left = sphere % across * pixels, bottom = (down - 1 - Math.floor(sphere / across)) * pixels;
-      gl.viewport(left, bottom, pixels, pixels);
-      gl.uniform2f(at('corner'), left, bottom);
-      this.explorer.parameters.forEach((parameter, k) => {
-        const value = this.values[k][sphere], place = at(`parameters.${parameter.name}`);
-        if (value.length === 3) gl.uniform3f(place, ...value);
-        else gl.uniform1f(place, value[0]);
-      });
-      gl.drawArrays(gl.TRIANGLES, 0, 3);
+    const uniforms = {
+      light: [Math.sin(theta) * Math.cos(phi), Math.sin(theta) * Math.sin(phi), Math.cos(theta)],
+      exposure: 2 ** byId('exposure').value,
+      square_root: byId('image-axis').value === 'root' ? 1 : 0,
+    };
+    for (const name of ['low', 'middle', 'high']) uniforms[name] = colourOf(`--${name}`).map((c) => c / 255);
+    byId(id).querySelectorAll('canvas').forEach((canvas, k) => {
+      const { shown, sphere } = this.panels[k];
+      const values = this.values.map((value) => value[sphere]);
+      brdfs.draw(canvas, canvas.clientWidth, view, shown, this.explorer.parameters, values, uniforms);
     });
+  },
+
+  /** Read back from the graphics card, so that the curves are those of the shader. */
+  drawLobes() {
+    const thetaI = byId('lobe-theta').value * Math.PI / 180, chart = byId('lobe-chart');
+    const panels = this.panels.filter((panel) => panel.shown !== 'difference');
+    // The reference first, as among the slices.
+    panels.sort((a, b) => (a.shown === 'reference' ? 0 : 1) - (b.shown === 'reference' ? 0 : 1));
+    this.lobes = panels.map(({ shown, sphere, label }) => ({
+      label,
+      values: brdfs.lobe(shown, this.explorer.parameters, this.values.map((value) => value[sphere]), thetaI),
+    }));
+    const first = panels[0].shown === 'reference' ? 0 : 1;
+    const axis = valueAxis(this.lobes.flatMap((lobe) => lobe.values), byId('lobe-scale').value === 'log');
+    const width = Math.max(chart.clientWidth, 280), height = Math.round(Math.min(width * 0.56, 420));
+    const polar = polarChart(width, height, axis);
+    polar.ray(-Number(byId('lobe-theta').value), 'light');
+    this.lobes.forEach(({ values }, k) => polar.line(first + k, values.map((v, at) => [lobeAngles[at], v])));
+    chart.replaceChildren(polar.svg);
+    byId('lobe-readout').replaceChildren(...this.lobes.map(({ label, values }, k) => {
+      const highest = values.reduce((best, v, at) => v > values[best] ? at : best, 0);
+      return make('tr', {}, make('th', { scope: 'row' }, swatchOf(first + k), label), make('td', {}, written(values[highest])),
+          make('td', {}, `${tickText(lobeAngles[highest])}°`));
+    }));
   },
 
   /** The light goes where the sphere under the pointer would face it: its edge is 90° from the viewer. */
   turn(event) {
-    const box = byId('spheres').getBoundingClientRect(), { side } = this.layout();
-    const scale = side * this.layout().across / box.width;
-    const x = (event.clientX - box.left) * scale, y = (event.clientY - box.top) * scale;
-    const within = (v) => 2 * (v - side * Math.floor(v / side)) / side - 1;
-    const right = within(x), up = -within(y);
+    if (!(event.target instanceof HTMLCanvasElement)) return;
+    const box = event.target.getBoundingClientRect();
+    const right = 2 * (event.clientX - box.left) / box.width - 1, up = 1 - 2 * (event.clientY - box.top) / box.height;
     byId('light-theta').value = Math.round(Math.min(Math.hypot(right, up) * 90, 180));
     byId('light-phi').value = Math.round((Math.atan2(up, right) * 180 / Math.PI + 360) % 360);
     this.draw();

@@ -4,14 +4,15 @@ const darkPreferred = matchMedia('(prefers-color-scheme: dark)');
 
 function startTheme() {
   const button = byId('theme'), root = document.documentElement;
-  const isDark = () => root.dataset.theme ? root.dataset.theme === 'dark' : darkPreferred.matches;
+  const isDark = () => root.style.colorScheme ? root.style.colorScheme === 'dark' : darkPreferred.matches;
   const update = () => {
     button.textContent = isDark() ? 'Light theme' : 'Dark theme';
     if (residualPanel.slices) residualPanel.draw();
+    if (explorerPanel.explorer) explorerPanel.draw();
   };
   button.hidden = false;
   button.addEventListener('click', () => {
-    root.dataset.theme = isDark() ? 'light' : 'dark';
+    root.style.colorScheme = isDark() ? 'light' : 'dark';
     update();
   });
   darkPreferred.addEventListener('change', update);
@@ -82,12 +83,16 @@ function startRows() {
     slicePanel.show(slices);
     residualPanel.show(slices);
     const glsl = article.querySelector('[data-language="glsl"] code');
-    explorerPanel.show(row.explorer, glsl && glsl.textContent);
+    explorerPanel.show(row.explorer, glsl && glsl.textContent, slices);
   };
   slicePanel.start();
   residualPanel.start();
   explorerPanel.start();
-  slicePanel.onChange = () => residualPanel.slices === slicePanel.slices && residualPanel.draw();
+  slicePanel.onChange = () => {
+    if (residualPanel.slices !== slicePanel.slices) return;
+    residualPanel.draw();
+    if (explorerPanel.row !== slicePanel.place().row) explorerPanel.chooseRow(slicePanel.place().row);
+  };
   document.querySelectorAll('.shaders').forEach(startTabs);
   select.addEventListener('input', show);
   show();

@@ -54,15 +54,14 @@ const residualPanel = {
       return values;
     });
     this.residuals = residuals;
-    const style = getComputedStyle(document.documentElement);
-    const colour = (name) => style.getPropertyValue(name).split(',').map(Number);
-    const [low, middle, high] = [colour('--low'), colour('--middle'), colour('--high')];
+    const [low, middle, high] = ['--low', '--middle', '--high'].map(colourOf);
+    const [masked, faint] = ['--masked', '--faint'].map((name) => `rgb(${colourOf(name).join(',')})`);
     const fill = (v) => {
-      if (!Number.isFinite(v)) return style.getPropertyValue('--masked');
+      if (!Number.isFinite(v)) return masked;
       const end = v < 0 ? low : high, t = largest > 0 ? Math.abs(v) / largest : 0;
       return `rgb(${middle.map((c, k) => Math.round(c + (end[k] - c) * t)).join(',')})`;
     };
-    this.canvases.forEach((canvas, k) => this.drawMap(canvas, residuals[k], k, fill, largest, style));
+    this.canvases.forEach((canvas, k) => this.drawMap(canvas, residuals[k], k, fill, largest, faint));
     const place = slicePanel.place();
     byId('residuals-note').textContent = (quantity === 'brdf' ? 'f' : 'π f cos θᵢ') + ' of the model minus that of the ' +
         `reference, at φ = ${tickText(slices.phi[place.phi])}°` +
@@ -71,7 +70,7 @@ const residualPanel = {
         ' Choose a line of the map to see its slice.';
   },
 
-  drawMap(canvas, values, k, fill, largest, style) {
+  drawMap(canvas, values, k, fill, largest, faint) {
     const columns = this.slices.theta_i.length, lines = this.lines();
     const width = Math.max(canvas.parentElement.clientWidth, 200), height = Math.round(width * 0.86);
     const ratio = window.devicePixelRatio || 1;
@@ -88,7 +87,7 @@ const residualPanel = {
       // Half a pixel over: neighbours leave no seams.
       context.fillRect(x(at % columns), y(Math.floor(at / columns)), w + 0.5, h + 0.5);
     });
-    context.fillStyle = context.strokeStyle = style.getPropertyValue('--faint');
+    context.fillStyle = context.strokeStyle = faint;
     context.font = '11px system-ui, "DejaVu Sans", sans-serif';
     context.textAlign = 'center';
     const every = Math.max(1, Math.round(columns / 4)), skip = Math.max(1, Math.round(lines / 5));
@@ -106,7 +105,7 @@ const residualPanel = {
       context.fillStyle = fill((2 * t / bar.width - 1) * largest);
       context.fillRect(bar.left + t, bar.top, 1.5, bar.height);
     }
-    context.fillStyle = style.getPropertyValue('--faint');
+    context.fillStyle = faint;
     context.textAlign = 'left';
     context.fillText(written(-largest, 3), bar.left, height - 4);
     context.textAlign = 'center';

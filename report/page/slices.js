@@ -12,6 +12,80 @@ function draw(parent, name, attributes, text) {
   return element;
 }
 
+/** Lower and upper end of the values' axis and the place of a value on it, 0 to 1. */
+function valueAxis(values, logarithmic) {
+  const finite = values.filter(Number.isFinite);
+  if (logarithmic) {
+    const positive = finite.filter((v) => v > 0);
+    const high = positive.length ? Math.max(...positive) * 1.15 : 1;
+    // Below a millionth of the highest nothing is told apart.
+    const low = Math.max(positive.length ? Math.min(...positive) / 1.15 : 0.1, high * 1e-6);
+    const span = Math.log(high / low);
+    const decades = powersOfTen(low, high);
+    return {
+      low, high,
+      at: (v) => v > 0 ? Math.max(Math.log(v / low) / span, 0) : 0,
+      ticks: decades.length > 1 ? decades : ticks(low, high, 4).filter((v) => v > 0),
+    };
+  }
+  const high = Math.max(0, ...finite) * 1.05 || 1, low = Math.min(0, ...finite) * 1.05;
+  return { low, high, at: (v) => (v - low) / (high - low), ticks: ticks(low, high, 5) };
+}
+
+/** A line over a chart: points, null where it is open. */
+function drawLine(svg, line, points) {
+  let d = '', open = false;
+  for (const point of points) {
+    if (point) d += `${open ? 'L' : 'M'}${point[0].toFixed(1)} ${point[1].toFixed(1)}`;
+    open = point !== null;
+  }
+  draw(svg, 'path', {
+    class: 'line', d, stroke: lineColour(line), 'stroke-dasharray': dashes[line % dashes.length],
+    'stroke-width': line === 0 ? 3 : 2,
+  });
+}
+
+function swatchOf(line) {
+  const swatch = make('span', { class: 'swatch' });
+  swatch.style.borderTopColor = lineColour(line);
+  if (dashes[line % dashes.length]) swatch.style.borderTopStyle = 'dashed';
+  return swatch;
+}
+
+/** Axes over a half plane: the radius is the value, the angle that to the normal, positive to the right. */
+function polarChart(width, height, axis) {
+  const svg = document.createElementNS(svgNamespace, 'svg');
+  svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
+  svg.setAttribute('aria-hidden', 'true');
+  const radius = Math.min(width / 2 - 24, height - 48), cx = width / 2, cy = height - 26;
+  const place = (angle, r) => [cx + r * Math.sin(angle * Math.PI / 180), cy - r * Math.cos(angle * Math.PI / 180)];
+  const point = ([angle, value]) => Number.isFinite(value) ? place(angle, radius * Math.max(axis.at(value), 0)) : null;
+  for (const tick of axis.ticks) {
+    const r = radius * axis.at(tick);
+    if (r < 8) continue;
+    draw(svg, 'path', { class: 'grid', d: `M${cx - r} ${cy}A${r} ${r} 0 0 1 ${cx + r} ${cy}` });
+    draw(svg, 'text', { x: cx + r, y: cy + 16, 'text-anchor': 'middle' }, tickText(tick));
+  }
+  for (const angle of [-90, -60, -30, 0, 30, 60, 90]) {
+    const [x, y] = place(angle, radius + 6);
+    draw(svg, 'path', { class: 'grid', d: `M${cx} ${cy}L${x} ${y}` });
+    if (Math.abs(angle) < 90) {
+      const [textX] = place(angle, radius + 16), [, textY] = place(angle, radius + 10);
+      draw(svg, 'text', { x: textX, y: textY, 'text-anchor': 'middle' }, `${Math.abs(angle)}°`);
+    }
+  }
+  return {
+    svg, point,
+    line: (line, points) => drawLine(svg, line, points.map(point)),
+    ray(angle, label) {
+      const [x, y] = place(angle, radius), [textX, textY] = place(angle, radius - 14);
+      draw(svg, 'path', { class: 'marker', d: `M${cx} ${cy}L${x} ${y}` });
+      draw(svg, 'text', { x: textX + 4, y: textY }, label);
+    },
+    angleAt: (px, py) => Math.abs(Math.atan2(px - cx, cy - py)) * 180 / Math.PI,
+  };
+}
+
 const slicePanel = {
   slices: null,
   onChange: () => {},
@@ -88,41 +162,19 @@ const slicePanel = {
     const width = Math.max(chart.clientWidth, 280);
     const polar = byId('drawing').value === 'polar';
     const height = polar ? Math.round(Math.min(width * 0.56, 420)) : Math.round(Math.min(Math.max(width * 0.5, 240), 420));
-    const svg = document.createElementNS(svgNamespace, 'svg');
-    svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
-    svg.setAttribute('aria-hidden', 'true');
-    if (polar) this.drawPolar(svg, width, height, lines, place);
-    else this.drawAlong(svg, width, height, lines);
-    chart.replaceChildren(svg);
+    chart.replaceChildren(polar ? this.drawPolar(width, height, lines, place) : this.drawAlong(width, height, lines));
     this.readOut(lines);
     this.onChange();
   },
 
-  /** Lower and upper end of the values' axis and the place of a value on it, 0 to 1. */
-  valueAxis(values) {
-    const finite = values.filter(Number.isFinite);
-    if (byId('scale').value === 'log') {
-      const positive = finite.filter((v) => v > 0);
-      const high = positive.length ? Math.max(...positive) * 1.15 : 1;
-      // Below a millionth of the highest nothing is told apart.
-      const low = Math.max(positive.length ? Math.min(...positive) / 1.15 : 0.1, high * 1e-6);
-      const span = Math.log(high / low);
-      const decades = powersOfTen(low, high);
-      return {
-        low, high,
-        at: (v) => v > 0 ? Math.max(Math.log(v / low) / span, 0) : 0,
-        ticks: decades.length > 1 ? decades : ticks(low, high, 4).filter((v) => v > 0),
-      };
-    }
-    const high = Math.max(0, ...finite) * 1.05 || 1, low = Math.min(0, ...finite) * 1.05;
-    return { low, high, at: (v) => (v - low) / (high - low), ticks: ticks(low, high, 5) };
-  },
-
-  drawAlong(svg, width, height, lines) {
+  drawAlong(width, height, lines) {
+    const svg = document.createElementNS(svgNamespace, 'svg');
+    svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
+    svg.setAttribute('aria-hidden', 'true');
     const slices = this.slices, left = 52, right = 14, top = 16, bottom = 40;
     const first = Math.min(0, slices.theta_i[0]), last = Math.max(90, slices.theta_i.at(-1));
     const x = (angle) => left + (angle - first) / (last - first) * (width - left - right);
-    const axis = this.valueAxis(lines.flat());
+    const axis = valueAxis(lines.flat(), byId('scale').value === 'log');
     const y = (value) => height - bottom - Math.min(Math.max(axis.at(value), 0), 1) * (height - top - bottom);
     for (const tick of axis.ticks) {
       draw(svg, 'path', { class: 'grid', d: `M${left} ${y(tick)}H${width - right}` });
@@ -136,65 +188,32 @@ const slicePanel = {
     const at = x(slices.theta_i[this.marker]);
     draw(svg, 'path', { class: 'marker', d: `M${at} ${top}V${height - bottom}` });
     lines.forEach((values, line) => {
-      this.path(svg, line, values.map((v, k) => Number.isFinite(v) ? [x(slices.theta_i[k]), y(v)] : null));
+      drawLine(svg, line, values.map((v, k) => Number.isFinite(v) ? [x(slices.theta_i[k]), y(v)] : null));
       const marked = values[this.marker];
       if (Number.isFinite(marked)) draw(svg, 'circle', { cx: at, cy: y(marked), r: 3.5, fill: lineColour(line) });
     });
     this.angleAt = (px) => first + (px - left) / (width - left - right) * (last - first);
+    return svg;
   },
 
-  /** Radius is the value, the angle to the normal theta_i: the chosen azimuth to the right, its opposite to the left. */
-  drawPolar(svg, width, height, lines, place) {
+  /** The chosen azimuth to the right, its opposite to the left. */
+  drawPolar(width, height, lines, place) {
     const slices = this.slices, across = this.opposite(place.phi);
     const other = across < 0 ? [] : slices.labels.map((_, line) => slices.theta_i.map(
         (_, thetaI) => slices.value(line, { ...place, phi: across, thetaI }, this.quantity())));
-    const axis = this.valueAxis(lines.concat(other).flat());
-    const radius = Math.min(width / 2 - 24, height - 48), cx = width / 2, cy = height - 26;
-    const point = (angle, value) => {
-      const r = radius * Math.max(axis.at(value), 0), t = angle * Math.PI / 180;
-      return [cx + r * Math.sin(t), cy - r * Math.cos(t)];
-    };
-    for (const tick of axis.ticks) {
-      const r = radius * axis.at(tick);
-      if (r < 8) continue;
-      draw(svg, 'path', { class: 'grid', d: `M${cx - r} ${cy}A${r} ${r} 0 0 1 ${cx + r} ${cy}` });
-      draw(svg, 'text', { x: cx + r, y: cy + 16, 'text-anchor': 'middle' }, tickText(tick));
-    }
-    for (const angle of [-90, -60, -30, 0, 30, 60, 90]) {
-      const t = angle * Math.PI / 180, far = radius + 6;
-      draw(svg, 'path', { class: 'grid', d: `M${cx} ${cy}L${cx + far * Math.sin(t)} ${cy - far * Math.cos(t)}` });
-      if (Math.abs(angle) < 90) {
-        draw(svg, 'text', { x: cx + (far + 10) * Math.sin(t), y: cy - (far + 4) * Math.cos(t), 'text-anchor': 'middle' },
-            `${Math.abs(angle)}°`);
-      }
-    }
+    const polar = polarChart(width, height, valueAxis(lines.concat(other).flat(), byId('scale').value === 'log'));
     // The viewer stands at azimuth 0: on the chosen side if that is 0, opposite to it if it is 180.
     const side = slices.phi[place.phi] === 0 ? 1 : slices.phi[place.phi] === 180 ? -1 : 0;
-    if (side) {
-      const t = side * slices.theta_o[place.thetaO] * Math.PI / 180;
-      draw(svg, 'path', { class: 'marker', d: `M${cx} ${cy}L${cx + radius * Math.sin(t)} ${cy - radius * Math.cos(t)}` });
-      draw(svg, 'text', { x: cx + (radius - 14) * Math.sin(t) + 4, y: cy - (radius - 14) * Math.cos(t) }, 'viewer');
-    }
+    if (side) polar.ray(side * slices.theta_o[place.thetaO], 'viewer');
     lines.forEach((values, line) => {
-      const right = values.map((v, k) => Number.isFinite(v) ? point(slices.theta_i[k], v) : null);
-      const left = (other[line] ?? []).map((v, k) => Number.isFinite(v) ? point(-slices.theta_i[k], v) : null);
-      this.path(svg, line, left.reverse().concat(right));
-      const marked = right[this.marker];
-      if (marked) draw(svg, 'circle', { cx: marked[0], cy: marked[1], r: 3.5, fill: lineColour(line) });
+      const right = values.map((v, k) => [slices.theta_i[k], v]);
+      const left = (other[line] ?? []).map((v, k) => [-slices.theta_i[k], v]);
+      polar.line(line, left.reverse().concat(right));
+      const marked = polar.point(right[this.marker]);
+      if (marked) draw(polar.svg, 'circle', { cx: marked[0], cy: marked[1], r: 3.5, fill: lineColour(line) });
     });
-    this.angleAt = (px, py) => Math.abs(Math.atan2(px - cx, cy - py)) * 180 / Math.PI;
-  },
-
-  path(svg, line, points) {
-    let d = '', open = false;
-    for (const point of points) {
-      if (point) d += `${open ? 'L' : 'M'}${point[0].toFixed(1)} ${point[1].toFixed(1)}`;
-      open = point !== null;
-    }
-    draw(svg, 'path', {
-      class: 'line', d, stroke: lineColour(line), 'stroke-dasharray': dashes[line % dashes.length],
-      'stroke-width': line === 0 ? 3 : 2,
-    });
+    this.angleAt = polar.angleAt;
+    return polar.svg;
   },
 
   point(event) {
@@ -216,11 +235,8 @@ const slicePanel = {
     byId('marker-value').textContent = `At θᵢ = ${tickText(slices.theta_i[this.marker])}°` +
         (byId('drawing').value === 'polar' ? '; the chosen azimuth is on the right, the opposite one on the left' : '');
     byId('readout').replaceChildren(...lines.map((values, line) => {
-      const swatch = make('span', { class: 'swatch' });
-      swatch.style.borderTopColor = lineColour(line);
-      if (dashes[line % dashes.length]) swatch.style.borderTopStyle = 'dashed';
       const difference = line === 0 ? '' : written(slices.difference(line, place, this.quantity()), 3);
-      return make('tr', {}, make('th', { scope: 'row' }, swatch, slices.labels[line]),
+      return make('tr', {}, make('th', { scope: 'row' }, swatchOf(line), slices.labels[line]),
           make('td', {}, written(values[this.marker])), make('td', {}, difference));
     }));
   },

@@ -11,6 +11,13 @@ function make(name, attributes = {}, ...children) {
   return element;
 }
 
+/** Red, green and blue of one of the page's colours, 0 to 255, in the theme that is on. */
+function colourOf(name) {
+  const probe = byId('probe');
+  probe.style.color = `var(${name})`;
+  return getComputedStyle(probe).color.match(/[\d.]+/g).slice(0, 3).map(Number);
+}
+
 function halfToNumber(bits) {
   const sign = bits & 0x8000 ? -1 : 1, exponent = (bits >> 10) & 31, fraction = bits & 1023;
   if (exponent === 0) return sign * fraction * 2 ** -24;
