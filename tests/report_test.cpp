@@ -145,6 +145,12 @@ TEST(HtmlReport, TextsCanNotBecomeMarkup) {
   HtmlRow& row = report.rows.front();
   row.name = row.note = row.slices.label = hostile;
   row.shaders = {{"glsl", hostile}};
+  row.matrices = {{.caption = hostile, .names = {hostile}, .values = {{1.0}}, .note = hostile}};
+  row.charts = report.charts = {{.title = hostile,
+                                 .horizontal = hostile,
+                                 .vertical = hostile,
+                                 .lines = {{hostile, {{1.0, 2.0}, {2.0, 3.0}}}},
+                                 .note = hostile}};
   row.figures = {{.title = hostile, .media_type = "image/svg+xml", .content = "<svg>\"><script>'%#</svg>"}};
   const std::string page = html_report(report);
   const auto count = [&](const char* part) {
@@ -208,6 +214,87 @@ TEST(HtmlReport, LargeTablesKeepTheirEnds) {
   EXPECT_GT(rows.size(), 1000u);
   EXPECT_EQ(rows.front(), "alpha 0");
   EXPECT_EQ(rows.back(), "alpha 59999");
+}
+
+/// The numbers of "cx" or "cy" of a chart's points, in their order.
+std::vector<double> coordinates(const std::string& page, const std::string& name) {
+  std::vector<double> list;
+  for (const Attribute& a : attributes(page)) {
+    if (a.element == "circle" && a.name == name) list.push_back(std::stod(a.value));
+  }
+  return list;
+}
+
+TEST(HtmlReport, ChartsPutNumbersWhereTheyBelong) {
+  HtmlReport report{.title = "Test"};
+  report.charts = {{.title = "powers",
+                    .horizontal = "x",
+                    .vertical = "y",
+                    .logarithmic = true,
+                    .lines = {{"a", {{0, 1}, {1, 10}, {2, 0.0}, {4, 1000}, {5, std::nan("")}, {6, INFINITY}}}}}};
+  const std::string page = html_report(report);
+  expect_self_contained(page);
+  const std::vector<double> x = coordinates(page, "cx"), y = coordinates(page, "cy");
+  ASSERT_EQ(x.size(), 3u) << "neither zero nor what is not finite can stand on a logarithmic axis";
+  EXPECT_NEAR((x[2] - x[1]) / (x[1] - x[0]), 3.0, 0.01);
+  EXPECT_NEAR((y[2] - y[1]) / (y[1] - y[0]), 2.0, 0.01);
+  EXPECT_GT(y[0], y[1]);  // downwards in an SVG
+  EXPECT_TRUE(contains(page, ">100<") && contains(page, ">10<"));
+
+  report.charts.front().logarithmic = false;
+  const std::vector<double> linear = coordinates(html_report(report), "cy");
+  ASSERT_EQ(linear.size(), 4u);
+  EXPECT_NEAR((linear[3] - linear[0]) / (linear[1] - linear[0]), 111.0, 10.0);
+
+  report.charts.front().lines.front().points = {{1.0, std::nan("")}};
+  EXPECT_FALSE(contains(html_report(report), "<circle")) << "nothing to draw, nothing drawn";
+}
+
+TEST(HtmlReport, MatricesAreShadedBySize) {
+  HtmlReport report{.title = "Test"};
+  report.rows.push_back({.name = "row"});
+  report.rows.front().matrices = {
+      {.caption = "Correlation", .names = {"a", "b"}, .values = {{1.0, -0.97}, {0.2, 0.0}}, .note = ""}};
+  const std::string page = html_report(report);
+  for (const char* cell : {"<td class=\"high s10\">1.00</td>", "<td class=\"low s10\">-0.97</td>",
+                           "<td class=\"high s2\">0.20</td>", "<td class=\"high s0\">0.00</td>"})
+    EXPECT_TRUE(contains(page, cell)) << cell;
+}
+
+/// Dense tables without parameter rows are thinned in their angles; what is left is the table's own.
+TEST(HtmlReport, DenseTablesAreThinnedInTheirAngles) {
+  Table table = small_table(3);
+  table.parameter_axes.clear();
+  for (Axis* axis : {&table.grid.theta_i, &table.grid.theta_o}) {
+    axis->values.clear();
+    for (int k = 0; k < 45; ++k) axis->values.push_back(2.0 * k);
+  }
+  table.grid.phi.values.clear();
+  for (int k = 0; k < 91; ++k) table.grid.phi.values.push_back(2.0 * k);
+  table.allocate();
+  for (std::size_t k = 0; k < table.values.size(); ++k)
+    table.values[k] = static_cast<float>(k / table.entries() + 1) + static_cast<float>(k % table.entries()) / 4e5f;
+  const std::string page = html_report(report_of(std::make_shared<Table>(table), {{"model", table.values}}));
+  EXPECT_LT(page.size(), 2'500'000u);
+  EXPECT_TRUE(contains(page, "evenly spread"));
+  const Json data = page_data(page), &slices = data.at("rows").at(0).at("slices");
+  const std::vector<double> reference = unpacked(data.at("arrays").at(slices.at("reference").get<std::size_t>()));
+  const std::vector<double> theta_o = slices.at("theta_o"), theta_i = slices.at("theta_i"), phi = slices.at("phi");
+  ASSERT_EQ(reference.size(), 3 * theta_o.size() * theta_i.size() * phi.size());
+  for (const std::vector<double>* axis : {&theta_o, &theta_i}) {
+    EXPECT_EQ(axis->front(), 0.0);
+    EXPECT_EQ(axis->back(), 88.0);
+    EXPECT_GT(axis->size(), 15u);
+  }
+  EXPECT_EQ(phi.back(), 180.0);
+  for (std::size_t k = 0; k < reference.size(); ++k) {
+    const std::size_t p = k % phi.size(), i = k / phi.size() % theta_i.size(),
+                      o = k / phi.size() / theta_i.size() % theta_o.size(),
+                      channel = k / phi.size() / theta_i.size() / theta_o.size();
+    const double entry = (theta_o[o] / 2.0 * 45.0 + theta_i[i] / 2.0) * 91.0 + phi[p] / 2.0;
+    const double truth = static_cast<double>(channel + 1) + entry / 4e5;
+    ASSERT_NEAR(reference[k], truth, truth / 2048.0) << k;
+  }
 }
 
 TEST(HtmlReport, RefusesTablesWithoutPolarAngles) {
@@ -367,14 +454,14 @@ TEST_F(ReportOfFolder, SlicesHaveTheResultsErrors) {
   const Json& explorer = data.at("rows").at(0).at("explorer");
   EXPECT_EQ(explorer.at("spheres"), Json({"published", "refit a, b", "refit albedo, a"}));
   for (const Json& parameter : explorer.at("parameters")) {
-    const Json& values = parameter.at("values");
+    const Json& values = parameter.at("values");  // [parameter row][sphere][component]
+    ASSERT_EQ(values.size(), 3u);
     if (parameter.at("name") == "a") {
-      EXPECT_EQ(values.at(0).at(0), -0.55);
-      EXPECT_NE(values.at(1).at(0), -0.55);
+      EXPECT_EQ(values.at(0).at(0).at(0), -0.55);
+      EXPECT_NE(values.at(0).at(1).at(0), -0.55);
     }
-    // The middle of the recipe's axis.
     if (parameter.at("name") == "alpha") {
-      EXPECT_EQ(values.at(1).at(0), 0.5);
+      EXPECT_EQ(values, Json::parse("[[[0.25],[0.25],[0.25]],[[0.5],[0.5],[0.5]],[[1.0],[1.0],[1.0]]]"));
     }
   }
 }
@@ -395,7 +482,7 @@ TEST_F(ReportOfFolder, RefusesWhatIsNoResult) {
   expect_refused("report", 2, {"DIR"});
   expect_refused("report nowhere", 3, {"nowhere", "no such folder"});
   fs::create_directory(folder_ / "empty");
-  expect_refused("report empty", 3, {"empty", "result.json"});
+  expect_refused("report empty", 3, {"empty", "result.json", "validation.json", "a fit"});
   const std::string fit = read_file(folder_ / "result/all.exact-a-b.fit.json");
   write("result/all.exact-a-b.fit.json", replaced(fit, "\"upper\": 2.0", "\"upper\": \"two\""));
   expect_refused("report result", 3, {"all.exact-a-b.fit.json", "$.params[1].upper", "expected a number"});
@@ -460,6 +547,227 @@ TEST_F(ReportOfFolder, TellsOfMaterials) {
   fs::remove(folder_ / "fits/report.html");
   write("fits/summary.json", replaced(summary, "\"converged\": true", "\"converged\": 1"));
   expect_refused("report fits", 3, {"summary.json", "$.fits[0].converged"});
+}
+
+/// How sure the fits of a row are stands beside them, as their files have it.
+TEST_F(ReportOfFolder, TellsHowSureFitsAre) {
+  ASSERT_EQ(run("report result").code, 0);
+  const std::string page = read_file(folder_ / "result/report.html");
+  const Json fit = read("result/all.exact-a-b.fit.json");
+  EXPECT_TRUE(contains(page, "<h4>Correlation, a, b</h4>"));
+  const double correlation = fit.at("correlation").at(0).at(1);
+  EXPECT_NE(correlation, 0.0);
+  EXPECT_TRUE(contains(page, ">" + decimals("%.2f", correlation) + "</td>"));
+  const Json& history = fit.at("solver").at("history");
+  ASSERT_GT(history.size(), 1u);
+  EXPECT_TRUE(contains(page, "<figcaption>Convergence, a, b</figcaption>"));
+  EXPECT_TRUE(contains(page, "From " + decimals("%.6g", history.front()) + " to " + decimals("%.6g", history.back())));
+}
+
+TEST_F(ReportOfFolder, TellsOfASingleFit) {
+  ASSERT_EQ(run("render lambert --grid small --set albedo=0.25 -o data.exr").code, 0);
+  fs::create_directory(folder_ / "single");
+  ASSERT_EQ(run("fit lambert data.exr --free albedo=0.6 --metric brdf --starts 3 -o single/grey.json").code, 0);
+  const Json fit = read("single/grey.json");
+  // π f of Lambert is its albedo: how far the start is off.
+  const Json& history = fit.at("solver").at("history");
+  EXPECT_NEAR(history.front(), 0.35, 1e-6);
+  EXPECT_NEAR(history.back(), 0.0, 1e-6);
+  for (std::size_t k = 1; k < history.size(); ++k) EXPECT_LE(history.at(k), history.at(k - 1));
+  EXPECT_EQ(fit.at("solver").at("start_misfits").size(), 3u);
+
+  const Outcome outcome = run("report single");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const std::string page = read_file(folder_ / "single/report.html");
+  expect_self_contained(page);
+  EXPECT_TRUE(contains(page, "<h1>lambert fitted to data.exr</h1>"));
+  EXPECT_TRUE(contains(page, "<td>0.25</td>"));
+  EXPECT_TRUE(contains(page, "<figcaption>Starts</figcaption>"));
+  const Json data = page_data(page);
+  const Json& slices = data.at("rows").at(0).at("slices");
+  for (const double v : unpacked(data.at("arrays").at(slices.at("reference").get<std::size_t>())))
+    EXPECT_NEAR(v, 0.25 / pi, 0.25 / pi / 2048.0);
+  EXPECT_EQ(data.at("rows").at(0).at("explorer").at("spheres"), Json({"fitted"}));
+
+  // The file may have moved beside the fit, or be gone; another of its name is not taken for it.
+  fs::rename(folder_ / "data.exr", folder_ / "single/data.exr");
+  ASSERT_EQ(run("report single --force").code, 0);
+  EXPECT_EQ(read_file(folder_ / "single/report.html"), page);
+  fs::remove(folder_ / "single/data.exr");
+  ASSERT_EQ(run("render lambert --grid small --set albedo=0.5 -o data.exr").code, 0);
+  const Outcome without = run("report single --force");
+  EXPECT_EQ(without.code, 0);
+  EXPECT_TRUE(contains(without.err, "data of grey are not where the fit found them")) << without.err;
+  EXPECT_TRUE(page_data(read_file(folder_ / "single/report.html")).at("rows").at(0).at("slices").is_null());
+}
+
+TEST_F(ReportOfFolder, RefusesBrokenFits) {
+  ASSERT_EQ(run("render proxima --grid small --set alpha=0.5 -o data.exr").code, 0);
+  fs::create_directory(folder_ / "single");
+  ASSERT_EQ(run("fit proxima data.exr --free a,b -o single/one.fit.json").code, 0);
+  const std::string text = read_file(folder_ / "single/one.fit.json");
+  Json fit = Json::parse(text);
+  const auto refused = [&](const Json& broken, std::initializer_list<const char*> fragments) {
+    write("single/one.fit.json", broken.dump());
+    expect_refused("report single", 3, fragments);
+  };
+  Json broken = fit;
+  for (Json& p : broken.at("params")) {
+    if (p.at("name") == "a") p.at("value") = -0.2;
+  }
+  refused(broken, {"one.fit.json", "$.metrics.log", "fit again"});
+  broken = fit;
+  broken.at("correlation").erase(0);
+  refused(broken, {"one.fit.json", "$.correlation", "2 parameters are free"});
+  broken = fit;
+  broken.at("solver").at("history").at(0) = "high";
+  refused(broken, {"one.fit.json", "$.solver.history[0]", "expected a number"});
+  broken = fit;
+  broken.erase("params");
+  refused(broken, {"one.fit.json", "missing 'params'"});
+  write("single/one.fit.json", text.substr(0, text.size() - 20));
+  expect_refused("report single", 3, {"one.fit.json", "not valid JSON"});
+  write("single/one.fit.json", text);
+  write("single/notes.json", "{");
+  expect_refused("report single", 3, {"notes.json", "not valid JSON"});
+}
+
+TEST_F(ReportOfFolder, TellsOfCurves) {
+  write("curves.json", R"({
+    "recipe": "tiny", "kind": "curves", "title": "Tiny curves", "description": "For tests.", "alpha": [0.2, 0.5, 1],
+    "grid": {"theta_i": [5, 25, 45, 65, 85], "theta_o": [5, 25, 45, 65, 85], "phi": [0, 30, 60, 90, 120, 150, 180]},
+    "metric": "brdf", "weights": "cos_theta_i,cos_theta_i,sin_theta_i,sin_theta_o",
+    "references": [{"name": "one", "reference": "microfacet_diffuse", "set": {"bounces": "1"}, "albedo": [1]},
+                   {"name": "all", "reference": "microfacet_diffuse", "set": {"bounces": "all"}, "albedo": [0.3]}],
+    "models": [{"model": "callisto_lambert", "label": "slides", "fixed": {"f0": 0, "specular_fresnel_falloff": 0}}],
+    "free": ["albedo", "diffuse_fresnel"],
+    "contested": {"name": "tangent", "parameters": ["diffuse_fresnel_tangent_falloff"], "claim": "low"},
+    "bounds": {"albedo": [0, 4]}, "wide_bounds": {"diffuse_fresnel": [-256, 256]}, "usable": {"albedo": [0.4, 1.6]},
+    "starts": [{"diffuse_fresnel": 0.5}], "tolerance": 0.1,
+    "comparisons": [{"name": "facets", "reference": "microfacet_diffuse",
+      "set": {"facet": "callisto", "masking": "view_only"}, "model": "callisto_lambert",
+      "shared": {"diffuse_fresnel": 4}, "alpha": [0.3], "samples": 64}]})");
+  ASSERT_EQ(run("refit curves.json -o curves").code, 0);
+  const Outcome outcome = run("report curves");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const std::string page = read_file(folder_ / "curves/report.html");
+  expect_self_contained(page);
+  const Json result = read("curves/result.json"), data = page_data(page);
+  ASSERT_EQ(data.at("rows").size(), 2u);
+  EXPECT_TRUE(contains(page, "What is called negligible"));
+  std::size_t compared = 0;
+  for (const Json& row : result.at("rows")) {
+    EXPECT_TRUE(contains(page, "<td>" + decimals("%.4f", row.at("rms").at("refit"))));
+    for (const auto& [name, estimate] : row.at("params").items())
+      EXPECT_TRUE(contains(page, decimals("%.4g", estimate.at("value")))) << name;
+    // The slices' line against the reference, weighted as the recipe says and per unit of albedo, is the row's rms.
+    const bool bounces = row.at("table") == "all";
+    const Json& slices = data.at("rows").at(bounces ? 1 : 0).at("slices");
+    const std::size_t alpha = row.at("alpha") == 0.2 ? 0 : row.at("alpha") == 0.5 ? 1 : 2;
+    const Json& line = slices.at("lines").at(row.at("tangent") == "free" ? 0 : 1);
+    const std::vector<double> difference = unpacked(data.at("arrays").at(line.at("difference").get<std::size_t>()));
+    double sum = 0.0, total = 0.0;
+    for (std::size_t k = 0; k < 175; ++k) {
+      const double theta_i = slices.at("theta_i").at(k / 7 % 5).get<double>() * pi / 180.0;
+      const double theta_o = slices.at("theta_o").at(k / 35).get<double>() * pi / 180.0;
+      const double weight = std::pow(std::cos(theta_i), 2) * std::sin(theta_i) * std::sin(theta_o);
+      sum += weight * std::pow(pi * difference[alpha * 175 + k], 2);
+      total += weight;
+    }
+    const double rms = row.at("rms").at("refit");
+    EXPECT_NEAR(std::sqrt(sum / total) / row.at("albedo").get<double>(), rms, 2e-3 * rms + 1e-6);
+    ++compared;
+  }
+  EXPECT_EQ(compared, 12u);
+  const Json& explorer = data.at("rows").at(0).at("explorer");
+  EXPECT_EQ(explorer.at("spheres"), Json({"tangent free", "tangent fixed"}));
+  EXPECT_TRUE(contains(page, "vec3 Lobefit_callisto_lambert("));
+
+  const std::string text = read_file(folder_ / "curves/result.json");
+  fs::remove(folder_ / "curves/report.html");
+  Json other = result;
+  other.at("rows").at(0).at("params").at("albedo").at("value") = 0.9;
+  write("curves/result.json", other.dump());
+  expect_refused("report curves", 3, {"result.json", "$.rows[0].rms.refit", "run the recipe again"});
+  other = result;
+  other.at("rows").erase(0);
+  write("curves/result.json", other.dump());
+  expect_refused("report curves", 3, {"result.json", "rows of callisto_lambert on one", "missing"});
+  write("curves/result.json", text);
+  fs::remove(folder_ / "curves/one.exr");
+  const Outcome without = run("report curves");
+  EXPECT_EQ(without.code, 0);
+  EXPECT_TRUE(contains(without.err, "lacks one.exr")) << without.err;
+}
+
+/// With a data folder of one shipped tree: the whole of them take minutes.
+TEST_F(ReportOfFolder, TellsOfSubstrate) {
+  const fs::path data = folder_ / "data";
+  fs::create_directories(data / "substrate");
+  const fs::path shipped = LOBEFIT_DATA_FOLDER;
+  fs::copy_file(shipped / "substrate/coated_metal.json", data / "substrate/coated_metal.json");
+  fs::copy_file(shipped / "substrate_rules.json", data / "substrate_rules.json");
+  ::setenv("LOBEFIT_DATA", data.c_str(), 1);
+  write("rules.json",
+        R"({"recipe": "rules", "kind": "substrate_rules", "title": "Few pairs", "description": "For tests.",
+    "pairs": 20, "held_out": 20, "pairs_seed": 1, "samples": 32, "albedo_paths": 64, "diffuse_model": "chan",
+    "brdf_weight": 0.2, "tree_samples": 32})");
+  const Outcome validated = run("slab validate coated_metal --samples 32 -o slab"),
+                refitted = run("refit rules.json -o rules");
+  const Outcome of_slab = run("report slab"), of_rules = run("report rules");
+  ::unsetenv("LOBEFIT_DATA");
+  ASSERT_EQ(validated.code, 0) << validated.err;
+  ASSERT_EQ(refitted.code, 0) << refitted.err;
+  ASSERT_EQ(of_slab.code, 0) << of_slab.err;
+  EXPECT_EQ(of_slab.err, "");
+  ASSERT_EQ(of_rules.code, 0) << of_rules.err;
+
+  const Json validation = read("slab/validation.json"), result = read("rules/result.json");
+  const std::string slab = read_file(folder_ / "slab/report.html"), rules = read_file(folder_ / "rules/report.html");
+  const auto expect_stages = [](const std::string& page, const Json& document) {
+    for (const auto& [name, stages] : document.at("strategies").items()) {
+      EXPECT_TRUE(contains(page, "<h4>Stages, " + name + "</h4>"));
+      for (const Json& stage : stages) {
+        for (const char* against : {"simplification", "model"}) {
+          for (const char* error : {"error", "brdf_rms_log", "albedo_rms_relative"})
+            EXPECT_TRUE(contains(page, "<td>" + decimals("%.4f", stage.at(against).at(error)) + "</td>"))
+                << name << error;
+        }
+      }
+    }
+  };
+  for (const std::string* page : {&slab, &rules}) {
+    expect_self_contained(*page);
+    EXPECT_LT(page->size(), 1'000'000u);
+    EXPECT_TRUE(contains(*page, "Lobefit_BlendVertical"));
+    EXPECT_TRUE(contains(*page, "Against the layers as matter"));
+  }
+  expect_stages(slab, validation);
+  EXPECT_TRUE(contains(unescaped(slab), "What simplifying " + validation.at("title").get<std::string>() + " costs"));
+  EXPECT_TRUE(contains(slab, validation.at("provenance").at("tree_sha256").get<std::string>()));
+  expect_stages(rules, result.at("trees").at("coated_metal"));
+  EXPECT_EQ(page_data(rules).at("rows").size(), 2u);
+  for (const auto& [name, constant] : result.at("constants").items())
+    EXPECT_TRUE(contains(rules, "<td>" + decimals("%.4f", constant.at("value")) + "</td>")) << name;
+  for (const Json& row : result.at("rows")) {
+    const Json& fitted = row.at("albedo_error").at("fitted");
+    if (fitted.at("count") == 0) continue;
+    EXPECT_TRUE(contains(rules, decimals("%.3f", fitted.at("median")) + " / " + decimals("%.3f", fitted.at("p90"))));
+  }
+
+  for (const char* page : {"slab/report.html", "rules/report.html"}) fs::remove(folder_ / page);
+  Json broken = validation;
+  broken.at("strategies").at("fitted").at(0).at("model").erase("error");
+  write("slab/validation.json", broken.dump());
+  expect_refused("report slab", 3, {"validation.json", "$.strategies.fitted[0].model", "error"});
+  write("slab/validation.json", validation.dump().substr(0, 500));
+  expect_refused("report slab", 3, {"validation.json", "not valid JSON"});
+  broken = result;
+  broken.at("constants").at("blur").at("ci95") = {1.0};
+  write("rules/result.json", broken.dump());
+  expect_refused("report rules", 3, {"result.json", "$.constants.blur.ci95", "two numbers"});
 }
 
 }  // namespace
