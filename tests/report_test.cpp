@@ -569,8 +569,10 @@ TEST_F(ReportOfFolder, TellsOfASingleFit) {
   fs::create_directory(folder_ / "single");
   ASSERT_EQ(run("fit lambert data.exr --free albedo=0.6 --metric brdf --starts 3 -o single/grey.json").code, 0);
   const Json fit = read("single/grey.json");
-  // π f of Lambert is its albedo: how far the start is off.
-  const Json& history = fit.at("solver").at("history");
+  // π f of Lambert is its albedo: how far the start is off. Of several starts the best one may be another.
+  ASSERT_EQ(run("fit lambert data.exr --free albedo=0.6 --metric brdf -o alone.json").code, 0);
+  const Json alone = read("alone.json");
+  const Json& history = alone.at("solver").at("history");
   EXPECT_NEAR(history.front(), 0.35, 1e-6);
   EXPECT_NEAR(history.back(), 0.0, 1e-6);
   for (std::size_t k = 1; k < history.size(); ++k) EXPECT_LE(history.at(k), history.at(k - 1));

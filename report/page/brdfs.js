@@ -110,7 +110,7 @@ vec4 image() {
     vec2 angle = radians(90.0 * vec2(square_root ? share.x * share.x : share.x, share.y));
     vec3 d = vec3(0.0, sin(angle.y), cos(angle.y));
     vec3 wi = vec3(sin(angle.x) * d.z, d.y, cos(angle.x) * d.z);
-    return vec4(picture(3.14159265 * value(wi, vec3(wi.x, -wi.y, wi.z))), 1.0);
+    return vec4(picture(1.57079633 * value(wi, vec3(wi.x, -wi.y, wi.z))), 1.0);
 }
 
 void main() { colour = view == 0 ? sphere() : view == 1 ? lobe() : image(); }`;

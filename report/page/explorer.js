@@ -30,10 +30,8 @@ const explorerPanel = {
       input.value = id === 'light-phi' ? (value + 360) % 360 : value;
       this.draw();
     });
-    let width = 0;
     new ResizeObserver(() => {
-      if (this.explorer && spheres.clientWidth !== width) this.draw();
-      width = spheres.clientWidth;
+      if (this.explorer && spheres.clientWidth !== this.width) this.draw();
     }).observe(spheres);
   },
 
@@ -91,6 +89,7 @@ const explorerPanel = {
     for (const id of ['light-theta', 'light-phi', 'exposure']) byId(`${id}-value`).textContent = minus(byId(id).value);
     byId('lobe-theta-value').textContent = `${byId('lobe-theta').value}°`;
     if (this.failed) return;
+    this.width = byId('spheres').clientWidth;
     this.drawPanels('spheres', 'sphere');
     this.drawPanels('image-slices', 'image');
     this.drawLobes();

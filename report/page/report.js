@@ -98,5 +98,5 @@ function startRows() {
   show();
 }
 
-startRows();
 startTheme();
+startRows();
