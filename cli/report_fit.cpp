@@ -43,7 +43,7 @@ void add_numbers(const JsonReader& object, const std::string& name, HtmlTable& t
   for (const auto& [key, member] : object.members()) {
     const std::string path = name.empty() ? key : name + ", " + key;
     if (member.value().is_object()) add_numbers(member, path, table);
-    if (member.value().is_number()) table.lines.push_back({path, fmt::format("{:.5g}", member.number())});
+    if (member.value().is_number()) table.lines.push_back({path, fmt::format("{:.6g}", member.number())});
   }
 }
 
@@ -136,11 +136,13 @@ HtmlRow fit_row(const std::string& name, const FolderFit& found, bool with_table
   const ParameterValues values = found.fit.values();
   HtmlRow row{.name = name,
               .note = fmt::format("{}; fitted data have SHA-256 {}.", model.info->title, found.table_sha256)};
-  if (reader.has("remarks")) {
-    for (const std::string& remark : texts(reader.at("remarks"))) row.note += " " + remark + ".";
-  }
   row.tables = {parameters_table(found.fit), metrics_table(reader)};
   if (reader.has("tiers")) row.tables.push_back(tiers_table(reader.at("tiers")));
+  if (reader.has("remarks") && !reader.at("remarks").value().empty()) {
+    HtmlTable table{.caption = "Remarks", .header = {"what the fit found"}};
+    for (const std::string& remark : texts(reader.at("remarks"))) table.lines.push_back({remark});
+    row.tables.push_back(std::move(table));
+  }
   add_fit_quality(found.fit, "", row);
   for (const std::string& language : shader_languages()) {
     if (!all_languages && language != "glsl") continue;

@@ -21,8 +21,8 @@ std::string error_text(const JsonReader& errors, const char* name) {
 
 HtmlTable stages_table(const std::string& strategy, const JsonReader& stages) {
   HtmlTable table{.caption = "Stages, " + strategy,
-                  .header = {"bytes", "closures", "last step", "simplification", "brdf", "albedo", "sphere ΔE_ITP",
-                             "model", "brdf", "albedo", "sphere ΔE_ITP"}};
+                  .header = {"bytes", "closures", "last step", "simplification", "its brdf", "its albedo",
+                             "its sphere, ΔE_ITP", "model", "its brdf", "its albedo", "its sphere, ΔE_ITP"}};
   for (const JsonReader& stage : stages.elements()) {
     const std::vector<std::string> steps = texts(stage.at("steps"));
     std::vector<std::string> cells{fmt::format("{:g}", stage.at("bytes").number()),
@@ -158,7 +158,7 @@ HtmlReport slab_report(const fs::path& folder, const JsonReader& validation) {
                     .command = command};
   for (const auto& [name, member] : provenance.members())
     report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
-  HtmlRow row = validation_row("validation", validation);
+  HtmlRow row = validation_row("Stages of simplifying", validation);
   const fs::path rules = shipped_rules();
   if (is_there(rules) && provenance.has("rules_sha256") &&
       provenance.at("rules_sha256").text() == sha256_of_file(rules)) {

@@ -79,8 +79,9 @@ const explorerPanel = {
     if (this.failed) return;
     brdfs.setReference(this.slices, row);
     byId('reference-note').textContent = this.slices ?
-        `The reference is ${this.slices.label}${this.slices.rows[row] ? ', ' + this.slices.rows[row] : ''}: ` +
-        'linear between the angles of its table; the row follows the slider Parameters above.' : '';
+        `The reference is ${this.slices.label}${this.slices.rows[row] ? ', ' + this.slices.rows[row] : ''}: linear between the ` +
+        'angles of its table, beyond them as at the nearest' +
+        (this.slices.rows.length > 1 ? '; all follow the slider Parameters above.' : '.') : '';
     this.draw();
   },
 
@@ -130,7 +131,7 @@ const explorerPanel = {
     byId('lobe-readout').replaceChildren(...this.lobes.map(({ label, values }, k) => {
       const highest = values.reduce((best, v, at) => v > values[best] ? at : best, 0);
       return make('tr', {}, make('th', { scope: 'row' }, swatchOf(first + k), label), make('td', {}, written(values[highest])),
-          make('td', {}, `${tickText(lobeAngles[highest])}°`));
+          make('td', {}, degreesText(lobeAngles[highest])));
     }));
   },
 

@@ -75,6 +75,7 @@ function startRows() {
   const select = byId('row'), articles = [...document.querySelectorAll('article.row')];
   select.append(...data.rows.map((row, k) => make('option', { value: k }, row.name)));
   byId('chooser').hidden = data.rows.length < 2;
+  if (data.rows.length < 2) byId('rows-title').textContent = data.rows[0].name;
   const show = () => {
     const row = data.rows[select.value], article = articles[select.value];
     articles.forEach((other) => { other.hidden = other !== article; });

@@ -38,7 +38,7 @@ const residualPanel = {
   },
 
   lines() { return this.overViews ? this.slices.theta_o.length : this.slices.rows.length; },
-  lineLabel(line) { return this.overViews ? `${tickText(this.slices.theta_o[line])}°` : this.slices.rows[line]; },
+  lineLabel(line) { return this.overViews ? degreesText(this.slices.theta_o[line]) : this.slices.rows[line]; },
 
   draw() {
     const slices = this.slices, quantity = slicePanel.quantity(), columns = slices.theta_i.length, lines = this.lines();
@@ -64,9 +64,9 @@ const residualPanel = {
     this.canvases.forEach((canvas, k) => this.drawMap(canvas, residuals[k], k, fill, largest, faint));
     const place = slicePanel.place();
     byId('residuals-note').textContent = (quantity === 'brdf' ? 'f' : 'π f cos θᵢ') + ' of the model minus that of the ' +
-        `reference, at φ = ${tickText(slices.phi[place.phi])}°` +
+        `reference, at φ = ${degreesText(slices.phi[place.phi])}` +
         (this.overViews ? `, ${slices.rows[place.row] || 'all parameters fixed'}; θᵢ across, θₒ upwards.`
-                        : `, θₒ = ${tickText(slices.theta_o[place.thetaO])}°; θᵢ across, parameter rows upwards.`) +
+                        : `, θₒ = ${degreesText(slices.theta_o[place.thetaO])}; θᵢ across, parameter rows upwards.`) +
         ' Choose a line of the map to see its slice.';
   },
 
@@ -92,7 +92,7 @@ const residualPanel = {
     context.textAlign = 'center';
     const every = Math.max(1, Math.round(columns / 4)), skip = Math.max(1, Math.round(lines / 5));
     for (let column = 0; column < columns; column += every)
-      context.fillText(`${tickText(this.slices.theta_i[column])}°`, x(column) + w / 2, height - box.bottom + 14);
+      context.fillText(degreesText(this.slices.theta_i[column]), x(column) + w / 2, height - box.bottom + 14);
     context.textAlign = 'right';
     for (let line = 0; line < lines; line += skip)
       context.fillText(this.lineLabel(line), box.left - 4, y(line) + h / 2 + 4, box.left - 6);
@@ -131,7 +131,7 @@ const residualPanel = {
     const hit = this.hit(event);
     byId('residuals-value').textContent = hit ?
         `${this.slices.labels[line]}: ${written(this.residuals[line - 1][hit.line * this.slices.theta_i.length + hit.column], 3)} at ` +
-        `θᵢ = ${tickText(this.slices.theta_i[hit.column])}°, ${this.overViews ? 'θₒ = ' : ''}${this.lineLabel(hit.line)}` : '';
+        `θᵢ = ${degreesText(this.slices.theta_i[hit.column])}, ${this.overViews ? 'θₒ = ' : ''}${this.lineLabel(hit.line)}` : '';
   },
 
   choose(event) {

@@ -121,7 +121,7 @@ const slicePanel = {
     prepare(this.inputs.phi, slices.phi.length, 0);
     prepare(this.inputs.row, slices.rows.length, Math.floor(slices.rows.length * 2 / 3));
     byId('channel').parentElement.hidden = slices.channels < 2;
-    byId('channel').value = '0';
+    byId('channel').value = '1';
     byId('quantity').value = slices.quantity === 'brdf' ? 'brdf' : 'cosine';
     this.draw();
   },
@@ -147,13 +147,12 @@ const slicePanel = {
 
   draw() {
     const slices = this.slices, place = this.place();
-    const degrees = (value) => `${tickText(value)}°`;
-    byId('theta-o-value').textContent = degrees(slices.theta_o[place.thetaO]);
-    byId('phi-value').textContent = degrees(slices.phi[place.phi]) +
+    byId('theta-o-value').textContent = degreesText(slices.theta_o[place.thetaO]);
+    byId('phi-value').textContent = degreesText(slices.phi[place.phi]) +
         (slices.phi[place.phi] === 0 ? ', retro side' : slices.phi[place.phi] === 180 ? ', mirror side' : '');
     byId('parameter-row-value').textContent = slices.rows[place.row];
-    this.inputs.thetaO.setAttribute('aria-valuetext', degrees(slices.theta_o[place.thetaO]));
-    this.inputs.phi.setAttribute('aria-valuetext', degrees(slices.phi[place.phi]));
+    this.inputs.thetaO.setAttribute('aria-valuetext', degreesText(slices.theta_o[place.thetaO]));
+    this.inputs.phi.setAttribute('aria-valuetext', degreesText(slices.phi[place.phi]));
     this.inputs.row.setAttribute('aria-valuetext', slices.rows[place.row]);
 
     const lines = slices.labels.map((_, line) => slices.theta_i.map(
@@ -232,7 +231,7 @@ const slicePanel = {
 
   readOut(lines) {
     const slices = this.slices, place = { ...this.place(), thetaI: this.marker };
-    byId('marker-value').textContent = `At θᵢ = ${tickText(slices.theta_i[this.marker])}°` +
+    byId('marker-value').textContent = `At θᵢ = ${degreesText(slices.theta_i[this.marker])}` +
         (byId('drawing').value === 'polar' ? '; the chosen azimuth is on the right, the opposite one on the left' : '');
     byId('readout').replaceChildren(...lines.map((values, line) => {
       const difference = line === 0 ? '' : written(slices.difference(line, place, this.quantity()), 3);

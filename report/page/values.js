@@ -93,3 +93,4 @@ function powersOfTen(low, high) {
 }
 
 const tickText = (value) => String(Number(value.toPrecision(6))).replace('-', '−');
+const degreesText = (value) => `${tickText(Math.round(10 * value) / 10)}°`;
