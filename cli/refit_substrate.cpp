@@ -377,6 +377,8 @@ void refit_substrate_rules(const fs::path& path, const std::string& output, bool
         {"fitted_haze", quantiles_json(mixes.fitted_haze)}}},
       {"budgets", budget_rows},
       {"constants", rules["constants"]},
+      {"correlation", solution.correlation},
+      {"history", solution.history},
       {"solver",
        {{"converged", solution.converged}, {"iterations", solution.iterations}, {"termination", solution.termination}}},
       {"trees", tree_rows},

@@ -220,6 +220,11 @@ void add_drawings(const JsonReader& result, const Contest& contest, std::shared_
   row.explorer = {.model = &model, .spheres = {free, fixed}, .fitted = texts(contest.free.front().at("free"))};
   const std::size_t shown = contest.free.size() * 2 / 3;
   const double alpha = contest.free[shown].at("alpha").number();
+  for (const auto* rows : {&contest.free, &contest.fixed}) {
+    const JsonReader& one = (*rows)[shown];
+    add_fit_quality(one, one.at("params"), fmt::format("{} {}, α = {:g}", contested, one.at(contested).text(), alpha),
+                    row);
+  }
   for (const std::string& language : shader_languages()) {
     row.shaders.push_back(
         {language, shader_text(model, as_values(model, row_values(model, contest.free[shown])), nullptr, language,

@@ -127,6 +127,22 @@ void add_fit_quality(const Fit& fit, const std::string& label, HtmlRow& row) {
   if (matrix.names.size() > 1 && matrix.values.size() == matrix.names.size()) row.matrices.push_back(std::move(matrix));
 }
 
+void add_fit_quality(const JsonReader& result, const JsonReader& parameters, const std::string& label, HtmlRow& row) {
+  if (!result.has("correlation") || !result.has("history")) return;  // of an older version
+  Fit fit;
+  for (const auto& [name, parameter] : parameters.members()) fit.parameters.push_back({.name = name, .free = true});
+  const JsonReader correlation = result.at("correlation");
+  for (const JsonReader& line : correlation.elements()) {
+    fit.solution.correlation.push_back(line.numbers());
+    if (fit.solution.correlation.back().size() != fit.parameters.size())
+      throw line.error(fmt::format("expected {} numbers", fit.parameters.size()), "run the recipe again");
+  }
+  if (fit.solution.correlation.size() != fit.parameters.size())
+    throw correlation.error(fmt::format("expected {} lines", fit.parameters.size()), "run the recipe again");
+  for (const JsonReader& misfit : result.at("history").elements()) fit.solution.history.push_back(misfit.number());
+  add_fit_quality(fit, label, row);
+}
+
 HtmlRow fit_row(const std::string& name, const FolderFit& found, bool with_table, bool all_languages,
                 const std::string& command, std::vector<std::string>& remarks) {
   const Json json = parse_json(read_file(found.path), found.path.string());

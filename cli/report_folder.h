@@ -68,6 +68,8 @@ HtmlRow fit_row(const std::string& name, const FolderFit& found, bool with_table
                 const std::string& command, std::vector<std::string>& remarks);
 /// How sure a fit is: its descent, its starts, its correlation matrix. `label` tells several of one row apart.
 void add_fit_quality(const Fit& fit, const std::string& label, HtmlRow& row);
+/// The same by a result's own "correlation" and "history", as far as it has them; `parameters` has the names.
+void add_fit_quality(const JsonReader& result, const JsonReader& parameters, const std::string& label, HtmlRow& row);
 
 /// "a, b"
 std::string joined(const std::vector<std::string>& names);

@@ -182,6 +182,7 @@ HtmlReport substrate_report(const fs::path& folder, const JsonReader& result) {
   HtmlRow rules{.name = "the rules", .note = "What makes one slab of two, for the view that the base pass knows."};
   rules.shaders = folder_shaders(folder, "substrate_rules");
   if (rules.shaders.empty()) report.remarks.emplace_back("The folder lacks the rules' shaders.");
+  add_fit_quality(result, result.at("constants"), "", rules);
   FolderFigures figures(folder);
   figures.add("trees", rules.figures);
   figures.add_remark(report.remarks);

@@ -878,6 +878,8 @@ Json CurveResult::json(const CurveRecipe& recipe, const std::string& command, st
               {"rms", {{"published", row.rms_default}, {"refit", row.rms}, {"curve", own.rms[row.alpha]}}},
               {"at_bound", at_bound(row.fit)},
               {"identifiable", row.fit.solution.identifiable},
+              {"correlation", row.fit.solution.correlation},
+              {"history", row.fit.solution.history},
               {"converged", row.fit.solution.converged},
               {"remarks", row.fit.solution.remarks}};
     if (row.lowest) {

@@ -429,17 +429,6 @@ Json estimate_json(const FitParameter& p) {
           {"identifiable", p.estimate.identifiable}};
 }
 
-namespace {
-
-/// JSON has no infinity: where a model has no finite value, null.
-Json finite_json(const std::vector<double>& values) {
-  Json list = Json::array();
-  for (const double value : values) list.push_back(std::isfinite(value) ? Json(value) : Json());
-  return list;
-}
-
-}  // namespace
-
 Json Fit::json(const std::string& command, const std::string& table_sha256) const {
   Json list = Json::array();
   for (const FitParameter& p : parameters) {
@@ -464,8 +453,8 @@ Json Fit::json(const std::string& command, const std::string& table_sha256) cons
        {{"converged", solution.converged},
         {"iterations", solution.iterations},
         {"starts", starts_tried},
-        {"start_misfits", finite_json(start_misfits)},
-        {"history", finite_json(solution.history)},
+        {"start_misfits", start_misfits},
+        {"history", solution.history},
         {"entries", entries},
         {"intervals", intervals_names[static_cast<std::size_t>(options.intervals)]},
         {"message", solution.termination},
@@ -493,7 +482,7 @@ std::vector<std::vector<double>> correlation_of(const JsonReader& fit, const std
   return lines;
 }
 
-/// Null is infinity.
+/// JSON has no infinity: null.
 std::vector<double> numbers_or_infinity(const JsonReader& list) {
   std::vector<double> values;
   for (const JsonReader& element : list.elements())

@@ -683,6 +683,13 @@ TEST_F(ReportOfFolder, TellsOfCurves) {
     ++compared;
   }
   EXPECT_EQ(compared, 12u);
+  // How sure the fits at the alpha that the shader is of are.
+  EXPECT_TRUE(contains(page, "<h4>Correlation, tangent free, α = 1</h4>"));
+  const Json& last = result.at("rows").at(2);
+  ASSERT_EQ(last.at("alpha"), 1.0);
+  EXPECT_TRUE(contains(page, " to " + decimals("%.6g", last.at("history").back()) + " in "));
+  const double correlation = last.at("correlation").at(0).at(1);
+  EXPECT_TRUE(contains(page, ">" + decimals("%.2f", correlation) + "</td>"));
   const Json& explorer = data.at("rows").at(0).at("explorer");
   EXPECT_EQ(explorer.at("spheres"), Json({"tangent free", "tangent fixed"}));
   EXPECT_TRUE(contains(page, "vec3 Lobefit_callisto_lambert("));
@@ -751,6 +758,8 @@ TEST_F(ReportOfFolder, TellsOfSubstrate) {
   EXPECT_TRUE(contains(slab, validation.at("provenance").at("tree_sha256").get<std::string>()));
   expect_stages(rules, result.at("trees").at("coated_metal"));
   EXPECT_EQ(page_data(rules).at("rows").size(), 2u);
+  EXPECT_TRUE(contains(rules, "<h4>Correlation</h4>"));
+  EXPECT_TRUE(contains(rules, " to " + decimals("%.6g", result.at("history").back()) + " in "));
   for (const auto& [name, constant] : result.at("constants").items())
     EXPECT_TRUE(contains(rules, "<td>" + decimals("%.4f", constant.at("value")) + "</td>")) << name;
   for (const Json& row : result.at("rows")) {
