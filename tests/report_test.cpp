@@ -549,6 +549,25 @@ TEST_F(ReportOfFolder, TellsOfMaterials) {
   expect_refused("report fits", 3, {"summary.json", "$.fits[0].converged"});
 }
 
+/// Every control operated, no console error, no request; spheres and lobes are those of `lobefit sphere` and `eval`.
+TEST_F(ReportOfFolder, BrowserHasNoComplaint) {
+  if (std::system("command -v chromium > /dev/null && command -v python3 > /dev/null") != 0)
+    GTEST_SKIP() << "chromium is not installed";
+  fs::create_directory(folder_ / "pages");
+  ASSERT_EQ(run("report result -o pages/report.html").code, 0);
+  const std::string command = "cd '" + folder_.string() +
+                              "' && '" LOBEFIT_REPORT_PICTURES
+                              "' pages/report.html --rows 2 -o pictures --lobefit '" LOBEFIT_PROGRAM "' >.out 2>&1";
+  EXPECT_EQ(std::system(command.c_str()), 0) << read_file(folder_ / ".out");
+  // Three models of the first row and two of the second.
+  const std::string said = read_file(folder_ / ".out");
+  std::size_t compared = 0;
+  for (std::size_t at = 0; (at = said.find("from lobefit sphere", at)) != std::string::npos; ++at) ++compared;
+  EXPECT_EQ(compared, 5u) << said;
+  for (const char* picture : {"light.png", "dark.png", "narrow.png", "narrow_dark.png", "operated.png"})
+    EXPECT_GT(fs::file_size(folder_ / "pictures/pages" / picture), 10'000u) << picture;
+}
+
 /// How sure the fits of a row are stands beside them, as their files have it.
 TEST_F(ReportOfFolder, TellsHowSureFitsAre) {
   ASSERT_EQ(run("report result").code, 0);
