@@ -533,6 +533,22 @@ TEST_F(CommandLine, CheckTellsWhatStorageCosts) {
   expect_refused("check lambert --tolerance 1", 2, {"--storage"});
 }
 
+TEST_F(CommandLine, ImageSlicesOfModelsAndTables) {
+  for (const char* file : {"a.svg", "b.svg"}) {
+    ASSERT_EQ(
+        run(std::string("plot image callisto --set alpha=0.3 --with eon:roughness=0.5 --steps 20 -o ") + file).code, 0);
+  }
+  EXPECT_TRUE(content(folder_ / "a.svg").starts_with("<?xml"));
+  EXPECT_EQ(content(folder_ / "a.svg"), content(folder_ / "b.svg"));
+  ASSERT_EQ(run("render lambert --axis albedo=0.25,0.5 --grid small -o t.exr").code, 0);
+  ASSERT_EQ(run("plot image t.exr --set albedo=0.5 --with lambert --steps 9 -o t.png").code, 0);
+  EXPECT_TRUE(content(folder_ / "t.png").starts_with("\x89PNG"));
+  expect_refused("plot image t.exr --steps 9 -o u.png", 2, {"albedo"});
+  expect_refused("plot image callisto --with eon:roughness=alpha -o u.png", 2, {"callisto", "no table"});
+  expect_refused("plot image callisto --phi-d 200 -o u.png", 2, {"phi_d", "180"});
+  expect_refused("plot image none.exr -o u.png", 3, {"none.exr"});
+}
+
 TEST_F(CommandLine, ParetoRefusesBeforeItWorks) {
   expect_refused("plot pareto -o pareto.txt", 2, {"--output", ".svg"});
   expect_refused("plot pareto --samples 0", 2, {"--samples"});
