@@ -441,7 +441,9 @@ TEST(ImageSlice, ShowsLogarithmsOverHalfAndDifferenceAngles) {
   ASSERT_EQ(plane.size(), 49u);
   for (std::size_t k = 0; k < 49; ++k) {
     const std::size_t sum = k % 7 + k / 7 + 1;  // 7: on the horizon
-    if (sum != 7) EXPECT_EQ(std::isnan(plane[k]), sum > 7) << k;
+    if (sum != 7) {
+      EXPECT_EQ(std::isnan(plane[k]), sum > 7) << k;
+    }
   }
 }
 
