@@ -9,6 +9,9 @@ namespace lobefit {
 /// batch/single/MODEL against batch/libm/MODEL, and all models one after the other.
 void register_model_batches();
 
+/// batch/SET/callisto for each instruction set that this machine has, against batch/libm/callisto.
+void register_instruction_sets();
+
 /// The microfacet-diffuse reference: facets, samples (facet × direction pairs), quadrature.
 void register_integrator();
 

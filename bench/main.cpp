@@ -69,6 +69,7 @@ int main(int argc, char** argv) {
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) return 2;
 
   lobefit::register_model_batches();
+  lobefit::register_instruction_sets();
   lobefit::register_integrator();
   lobefit::register_material_fit();
   lobefit::RatioTable table;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bench/benchmarks.h"
+#include "bench/instruction_set_model.h"
 #include "bench/libm_model.h"
 #include "reference/sample_points.h"
 
@@ -44,7 +45,20 @@ void register_batches(const std::string& name, const std::string& baseline, std:
   });
 }
 
+void register_set(const std::string& set, bool supported, Batch batch) {
+  if (!supported) return;
+  const ParameterValues defaults = find_model("callisto").defaults();
+  register_batches("batch/" + set + "/callisto", "batch/libm/callisto",
+                   {{batch, {defaults.flat().begin(), defaults.flat().end()}}});
+}
+
 }  // namespace
+
+void register_instruction_sets() {
+  register_set("sse2", true, evaluate_callisto_sse2);
+  register_set("avx2", __builtin_cpu_supports("avx2"), evaluate_callisto_avx2);
+  register_set("avx512f", __builtin_cpu_supports("avx512f"), evaluate_callisto_avx512f);
+}
 
 void register_model_batches() {
   std::vector<BatchWork> all_single, all_libm;

@@ -167,7 +167,10 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
           parameters_json(values),
           nullptr,
           hair,
-          model.info->isotropic};
+          model.info->isotropic,
+          nullptr,
+          &model,
+          {values.flat().begin(), values.flat().end()}};
 }
 
 ModelChoice find_model_or_fit(const std::string& name, const std::vector<std::string>& settings) {

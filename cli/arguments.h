@@ -82,6 +82,9 @@ struct Source {
   bool isotropic = false;                                  // known to be
   /// Directional albedo with the light at `theta` radians, of files that have their own quadrature.
   std::function<Albedo(double theta)> albedo_of_light = nullptr;
+  /// Of a model, with `flat` for parameters; null for all else.
+  const Model* model = nullptr;
+  std::vector<double> flat = {};
 };
 /// One parameter row of a file: that of `settings`; a table without axes has one. Throws Error(usage).
 std::size_t find_row(const Table& table, const std::vector<std::string>& settings);

@@ -7,6 +7,7 @@
 #include "cli/slice.h"
 #include "reference/output_file.h"
 #include "report/figure.h"
+#include "report/image_slice.h"
 
 namespace lobefit {
 
@@ -45,10 +46,14 @@ Table table_of(const PlotArguments& a, const Context& context) {
   return render(*model, prepared(model->defaults()), parse_axes(a.axes), grid, *monitor);
 }
 
-/// "NAME:k=v,…" or "fit.json:k=v,…" over the table; a value that is no number is a mapping of a table axis.
-LabelledTable model_on(const std::string& text, const Table& table) {
-  const std::size_t colon = text.find(':');
+/// "NAME:k=v,…" or "fit.json:k=v,…"; a value that is no number is a mapping of a table axis.
+struct ModelText {
+  std::string name, label;
   std::vector<std::string> settings, mappings;
+};
+ModelText parse_model(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  ModelText result{.name = text.substr(0, colon), .label = text};
   for (std::size_t begin = colon; begin != std::string::npos && begin + 1 < text.size();) {
     const std::size_t comma = text.find(',', begin + 1);
     const std::string setting =
@@ -56,12 +61,95 @@ LabelledTable model_on(const std::string& text, const Table& table) {
     const std::size_t equals = setting.find('=');
     const bool numeric = equals != std::string::npos && equals + 1 < setting.size() &&
                          setting.find_first_not_of("0123456789.+-eE", equals + 1) == std::string::npos;
-    (numeric ? settings : mappings).push_back(setting);
+    (numeric ? result.settings : result.mappings).push_back(setting);
     begin = comma;
   }
-  const ModelChoice choice = choose_for_table(text.substr(0, colon), settings, mappings, table);
-  const std::string label = choice.fit ? std::filesystem::path(text.substr(0, colon)).stem().string() : text;
-  return {label, TableModel(*choice.model, choice.values, table, choice.mappings).render()};
+  if (is_file(result.name)) result.label = std::filesystem::path(result.name).stem().string();
+  return result;
+}
+
+LabelledTable model_on(const std::string& text, const Table& table) {
+  const ModelText model = parse_model(text);
+  const ModelChoice choice = choose_for_table(model.name, model.settings, model.mappings, table);
+  return {model.label, TableModel(*choice.model, choice.values, table, choice.mappings).render()};
+}
+
+SphereBrdf brdf_of(const Model& model, std::vector<double> flat) {
+  return [&model, flat = std::move(flat)](const Direction& wi, const Direction& wo) {
+    return std::optional<Rgb>(model.evaluate(flat, wi, wo));
+  };
+}
+
+/// What tables lack leaves a hole.
+SphereBrdf brdf_of(const Source& source) {
+  return [source](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
+    try {
+      return source.evaluate(wi, wo);
+    } catch (const Error&) {
+      if (source.integrator) throw;
+      return std::nullopt;
+    }
+  };
+}
+
+/// NAME and what --with names: over one row of a table, which gives models its parameters, or with parameters of their
+/// own.
+std::vector<LabelledBrdf> image_slice_brdfs(const PlotArguments& a) {
+  std::vector<LabelledBrdf> brdfs{{a.name, brdf_of(find_source(a.name, a.settings))}};
+  std::optional<BrdfFile> file;
+  if (is_file(a.name)) {
+    file = read_brdf_file(a.name);
+    brdfs[0].label = std::filesystem::path(a.name).stem().string();
+  }
+  for (const std::string& text : a.models) {
+    const ModelText model = parse_model(text);
+    if (file) {
+      const ModelChoice choice = choose_for_table(model.name, model.settings, model.mappings, file->table);
+      const TableModel on_table(*choice.model, choice.values, file->table, choice.mappings);
+      brdfs.push_back({model.label, brdf_of(*choice.model, on_table.row(find_row(file->table, a.settings)))});
+      continue;
+    }
+    const ModelChoice choice = find_model_or_fit(model.name, model.settings);
+    if (!model.mappings.empty() || !choice.mappings.empty()) {
+      throw Error(ExitCode::usage, "its parameters follow a table's axes, and " + a.name + " is no table", text,
+                  "give numbers, or draw against a table");
+    }
+    brdfs.push_back({model.label, brdf_of(*choice.model, {choice.values.flat().begin(), choice.values.flat().end()})});
+  }
+  return brdfs;
+}
+
+void add_image(CLI::App& plot, Context& context) {
+  CLI::App* verb = plot.add_subcommand(
+      "image",
+      "pi f over theta_h and theta_d, and its ratio to the others' in stops\n"
+      "  lobefit plot image gold-metallic-paint.binary --with fit.json --with disney:roughness=0.4 -o image.png\n"
+      "  lobefit plot image callisto --set alpha=0.3 --with unreal_default_lit:roughness=0.55 --phi-d 0 -o image.svg");
+  verb->fallthrough();
+  const auto a = std::make_shared<PlotArguments>();
+  const auto options = std::make_shared<ImageSliceOptions>();
+  verb->add_option("NAME", a->name, "Table or measured file, reference or model")->required();
+  add_repeatable(*verb, "--with", a->models,
+                 "Model or fit beside it, NAME or NAME:parameter=value,… (repeatable);\n"
+                 "a value SCALE*AXIS^POWER maps a table axis");
+  add_repeatable(*verb, "--set", a->settings, "NAME=VALUE: of a model or reference a parameter, of a table its row");
+  verb->add_option("--phi-d", options->phi_d, "Azimuth of the difference vector in degrees")->capture_default_str();
+  verb->add_option("--steps", options->steps, "Cells along each angle")
+      ->check(CLI::Range(2, 720))
+      ->capture_default_str();
+  verb->add_option("--title", a->title, "Title (default: the name)");
+  verb->add_option("--width", a->width, "Width in pixels (default: what suits the panels)")
+      ->check(CLI::Range(200, 8000));
+  verb->add_option("--height", a->height, "Height in pixels")->check(CLI::Range(200, 8000));
+  verb->add_option("-o,--output", a->output, "Figure to write, .svg or .png")->required();
+  verb->callback([&context, a, options] {
+    const std::vector<LabelledBrdf> brdfs = image_slice_brdfs(*a);
+    FigureSize size = image_slice_figure_size(brdfs.size());
+    if (a->width > 0) size.width = a->width;
+    if (a->height > 0) size.height = a->height;
+    write_figure(image_slice_figure(brdfs, *options, a->title.empty() ? brdfs[0].label : a->title), a->output,
+                 context.force, size);
+  });
 }
 
 std::size_t index_on(const Axis& axis, double angle, const char* option) {
@@ -83,6 +171,7 @@ void add_plot(CLI::App& app, Context& context) {
       "  lobefit plot slices truth.exr --with proxima --with fit.json --with chan_2024 -o slices.svg\n"
       "  lobefit plot residuals truth.exr --with proxima --with eon:roughness=0.4*alpha^0.5 --phi 180 -o maps.png\n"
       "  lobefit plot slices microfacet_diffuse --axis alpha=0.1,0.5,1 --with proxima -o slices.png\n"
+      "  lobefit plot image callisto --set alpha=0.3 --with unreal_default_lit:roughness=0.55 -o image.png\n"
       "  lobefit plot pareto -o pareto.svg");
   verb->require_subcommand(1);
   const auto add = [&](const char* name, const char* description, auto figure, auto suitable_size) {
@@ -131,6 +220,7 @@ void add_plot(CLI::App& app, Context& context) {
         return residual_figure(t, m, c, title);
       },
       [](const Table& t, std::size_t models, const SliceChoice& c) { return residual_figure_size(t, models, c); });
+  add_image(*verb, context);
   add_plot_pareto(*verb, context);
 }
 

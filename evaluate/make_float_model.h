@@ -47,6 +47,15 @@ auto chunk_for([[maybe_unused]] std::span<const float> flat) {
   }
 }
 
+/// As FloatModel::evaluate.
+template <class M>
+void float_batch(std::span<const float> flat, const FloatPairs& pairs, std::size_t begin, std::size_t end,
+                 FloatRgb& values) {
+  chunk_for<M>(flat)(unflatten<M, Single>(flat), &pairs.wi_x[begin], &pairs.wi_y[begin], &pairs.wi_z[begin],
+                     &pairs.wo_x[begin], &pairs.wo_y[begin], &pairs.wo_z[begin], end - begin, &values.r[begin],
+                     &values.g[begin], &values.b[begin]);
+}
+
 }  // namespace
 
 /// `M` as a GPU runs it:
@@ -54,15 +63,7 @@ auto chunk_for([[maybe_unused]] std::span<const float> flat) {
 ///   add_float_model(make_float_model<MyModel>());   // after add_model()
 template <class M>
 FloatModel make_float_model() {
-  return {.name = M::info.name,
-          .evaluate =
-              [](std::span<const float> flat, const FloatPairs& pairs, std::size_t begin, std::size_t end,
-                 FloatRgb& values) {
-                chunk_for<M>(flat)(unflatten<M, Single>(flat), &pairs.wi_x[begin], &pairs.wi_y[begin],
-                                   &pairs.wi_z[begin], &pairs.wo_x[begin], &pairs.wo_y[begin], &pairs.wo_z[begin],
-                                   end - begin, &values.r[begin], &values.g[begin], &values.b[begin]);
-              },
-          .trace = &trace_shader<M>};
+  return {.name = M::info.name, .evaluate = &float_batch<M>, .trace = &trace_shader<M>};
 }
 
 }  // namespace lobefit

@@ -25,11 +25,6 @@ static_assert(replicate_count == 32);
 
 constexpr std::size_t most_default_rows = 6;
 
-/// ColorBrewer's RdBu with blue below and red above a true white.
-constexpr const char* diverging_palette =
-    "set palette defined (0 '#053061', 1 '#2166ac', 2 '#4393c3', 3 '#92c5de', 4 '#d1e5f0', 5 '#ffffff', "
-    "6 '#fddbc7', 7 '#f4a582', 8 '#d6604d', 9 '#b2182b', 10 '#67001f') maxcolors 255\n";
-
 // ---- Tables ---------------------------------------------------------------------------------------------------
 
 /// A place in the grid of any table with the reference's axes.

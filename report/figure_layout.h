@@ -87,6 +87,11 @@ inline double tick_step(double span, int count) {
   return 10.0 * decade;
 }
 
+/// ColorBrewer's RdBu with blue below and red above a true white.
+inline constexpr const char* diverging_palette =
+    "set palette defined (0 '#053061', 1 '#2166ac', 2 '#4393c3', 3 '#92c5de', 4 '#d1e5f0', 5 '#ffffff', "
+    "6 '#fddbc7', 7 '#f4a582', 8 '#d6604d', 9 '#b2182b', 10 '#67001f') maxcolors 255\n";
+
 // ---- Layout, in pixels from the top left ------------------------------------------------------------------------
 
 inline constexpr double title_size = 16.0, label_size = 12.0, tick_size = 11.0;

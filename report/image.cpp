@@ -65,4 +65,15 @@ void write_picture(const SphereImage& image, double exposure, const std::filesys
   file.commit();
 }
 
+LinearPicture read_picture(const std::filesystem::path& path) {
+  LinearPicture picture;
+  std::string failure;
+  if (!module_function<ReadPicture>(read_picture_symbol, path.string())(path, picture.rgb, picture.width,
+                                                                        picture.height, failure)) {
+    throw Error(ExitCode::invalid_input, failure, path.string(),
+                "use a picture file that OpenImageIO reads, .exr or .hdr say");
+  }
+  return picture;
+}
+
 }  // namespace lobefit

@@ -18,4 +18,12 @@ void write_false_colour(std::span<const float> values, std::size_t width, std::s
 /// 2^exposure; what then exceeds 1 is white in a PNG. Errors as above; Error(usage) for another extension.
 void write_picture(const SphereImage& image, double exposure, const std::filesystem::path& path, bool overwrite);
 
+struct LinearPicture {
+  std::size_t width = 0, height = 0;
+  std::vector<float> rgb;  // [line][column][channel], linear
+};
+/// Any format of OpenImageIO's; 8-bit ones are sRGB. Throws Error(invalid_input) for what can't be read,
+/// Error(missing_part) as above.
+LinearPicture read_picture(const std::filesystem::path& path);
+
 }  // namespace lobefit

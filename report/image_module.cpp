@@ -14,6 +14,7 @@ namespace {
 
 /// The map is linear, PNG is sRGB.
 float encode(float v) { return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1.0f / 2.4f) - 0.055f; }
+float decode(float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); }
 
 bool write(OIIO::ImageBuf& picture, OIIO::TypeDesc type, const std::filesystem::path& path, std::string& failure) {
   // Its own format attributes would carry the date; a picture of the same values has the same bytes.
@@ -30,6 +31,7 @@ bool write(OIIO::ImageBuf& picture, OIIO::TypeDesc type, const std::filesystem::
 extern "C" {
 WriteFalseColour lobefit_write_false_colour;
 WritePicture lobefit_write_picture;
+ReadPicture lobefit_read_picture;
 }
 
 bool lobefit_write_false_colour(std::span<const float> values, std::size_t width, std::size_t height,
@@ -81,6 +83,35 @@ bool lobefit_write_picture(std::span<const float> rgba, std::size_t size, bool d
   if (display) spec.attribute("oiio:UnassociatedAlpha", 1);
   OIIO::ImageBuf picture(spec, values.data());
   return write(picture, display ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, path, failure);
+}
+
+bool lobefit_read_picture(const std::filesystem::path& path, std::vector<float>& rgb, std::size_t& width,
+                          std::size_t& height, std::string& failure) {
+  OIIO::ImageBuf picture(path.string());
+  if (!picture.read(0, 0, /*force=*/true, OIIO::TypeDesc::FLOAT)) {
+    failure = picture.geterror();
+    return false;
+  }
+  const OIIO::ImageSpec& spec = picture.spec();
+  width = static_cast<std::size_t>(spec.width);
+  height = static_cast<std::size_t>(spec.height);
+  const auto channels = static_cast<std::size_t>(spec.nchannels);
+  std::vector<float> values(width * height * channels);
+  if (!picture.get_pixels(picture.roi(), OIIO::TypeDesc::FLOAT, values.data())) {
+    failure = picture.geterror();
+    return false;
+  }
+  const bool encoded =
+      picture.nativespec().format == OIIO::TypeDesc::UINT8 || spec.get_string_attribute("oiio:ColorSpace") == "sRGB";
+  rgb.resize(3 * width * height);
+  for (std::size_t pixel = 0; pixel < width * height; ++pixel) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      // One or two channels are grey.
+      const float value = values[pixel * channels + (channels >= 3 ? c : 0)];
+      rgb[3 * pixel + c] = encoded ? decode(value) : value;
+    }
+  }
+  return true;
 }
 
 }  // namespace lobefit

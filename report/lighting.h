@@ -5,10 +5,12 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string_view>
 #include <vector>
 
 #include "models/geometry.h"
+#include "report/sampled_light.h"
 
 namespace lobefit {
 
@@ -28,9 +30,10 @@ struct Lighting {
   std::vector<DirectionalLight> lights;
   Rgb constant;
   std::vector<LightLobe> lobes;
+  std::shared_ptr<const SampledLight> sampled = nullptr;
 
   bool has_environment() const { return !lobes.empty() || constant.x > 0.0 || constant.y > 0.0 || constant.z > 0.0; }
-  /// Of the environment, without the directional lights.
+  /// Of the environment in closed form.
   Rgb radiance(const Direction& w) const;
 
   /// One white light of irradiance π; angles in degrees as of direction_in_picture().

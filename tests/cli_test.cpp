@@ -72,6 +72,17 @@ class CommandLine : public ::testing::Test {
     for (const char* fragment : fragments) EXPECT_NE(outcome.err.find(fragment), std::string::npos) << outcome.err;
     EXPECT_EQ(files(), before) << arguments;
   }
+  /// An EXR of one channel and one value.
+  void write_grey(const char* name, int width, int height, float value) const {
+    const std::vector<float> pixels(static_cast<std::size_t>(width * height), value);
+    Imf::Header header(width, height);
+    header.channels().insert("Y", Imf::Channel(Imf::FLOAT));
+    Imf::FrameBuffer frame;
+    frame.insert("Y", Imf::Slice::Make(Imf::FLOAT, pixels.data(), Imath::V2i(0, 0), width, height));
+    Imf::OutputFile file((folder_ / name).c_str(), header);
+    file.setFrameBuffer(frame);
+    file.writePixels(height);
+  }
   std::vector<std::string> files() const {
     std::vector<std::string> names;
     for (const auto& file : fs::directory_iterator(folder_)) names.push_back(file.path().filename().string());
@@ -235,16 +246,7 @@ TEST_F(CommandLine, KilledAndInterruptedRendersGoOnToTheSameFile) {
 }
 
 TEST_F(CommandLine, LatLongPicturesOfSeveralViewsBecomeOneTable) {
-  Imf::Header header(64, 16);
-  header.channels().insert("Y", Imf::Channel(Imf::FLOAT));
-  std::vector<float> pixels(64 * 16, 0.25f);
-  Imf::FrameBuffer frame;
-  frame.insert("Y", Imf::Slice::Make(Imf::FLOAT, pixels.data(), Imath::V2i(0, 0), 64, 16));
-  {
-    Imf::OutputFile file((folder_ / "lobe.exr").c_str(), header);
-    file.setFrameBuffer(frame);
-    file.writePixels(16);
-  }
+  write_grey("lobe.exr", 64, 16, 0.25f);
   expect_refused("table info lobe.exr", 3, {"lobe.exr", "which direction it holds", "--wo"});
   expect_refused("table info lobe.exr --wo 95,0", 2, {"--wo", "out of range"});
   EXPECT_EQ(json("table info lobe.exr --wi 30,0")["format"], "lat_long");
@@ -531,6 +533,22 @@ TEST_F(CommandLine, CheckTellsWhatStorageCosts) {
   expect_refused("check lambert --tolerance 1", 2, {"--storage"});
 }
 
+TEST_F(CommandLine, ImageSlicesOfModelsAndTables) {
+  for (const char* file : {"a.svg", "b.svg"}) {
+    ASSERT_EQ(
+        run(std::string("plot image callisto --set alpha=0.3 --with eon:roughness=0.5 --steps 20 -o ") + file).code, 0);
+  }
+  EXPECT_TRUE(content(folder_ / "a.svg").starts_with("<?xml"));
+  EXPECT_EQ(content(folder_ / "a.svg"), content(folder_ / "b.svg"));
+  ASSERT_EQ(run("render lambert --axis albedo=0.25,0.5 --grid small -o t.exr").code, 0);
+  ASSERT_EQ(run("plot image t.exr --set albedo=0.5 --with lambert --steps 9 -o t.png").code, 0);
+  EXPECT_TRUE(content(folder_ / "t.png").starts_with("\x89PNG"));
+  expect_refused("plot image t.exr --steps 9 -o u.png", 2, {"albedo"});
+  expect_refused("plot image callisto --with eon:roughness=alpha -o u.png", 2, {"callisto", "no table"});
+  expect_refused("plot image callisto --phi-d 200 -o u.png", 2, {"phi_d", "180"});
+  expect_refused("plot image none.exr -o u.png", 3, {"none.exr"});
+}
+
 TEST_F(CommandLine, ParetoRefusesBeforeItWorks) {
   expect_refused("plot pareto -o pareto.txt", 2, {"--output", ".svg"});
   expect_refused("plot pareto --samples 0", 2, {"--samples"});
@@ -725,6 +743,29 @@ TEST_F(CommandLine, SpheresAreWrittenWholeAndTheSameTwice) {
   expect_refused("sphere hair_unreal -o c.png", 2, {"hair_unreal", "opaque"});
   expect_refused("sphere microfacet_diffuse --set bounces=all --set alpha_x=0.2 --set alpha_y=0.5 -o c.png", 2,
                  {"microfacet_diffuse", "table"});
+}
+
+TEST_F(CommandLine, SpheresUnderPicturesAndDisks) {
+  write_grey("room.exr", 64, 32, 0.5f);
+  const Json room = json("sphere lambert --set albedo=0.5 --environment room.exr --rotate 20 --size 32 -o a.exr");
+  EXPECT_EQ(room["lighting"], "room.exr");
+  EXPECT_LT(room["noise"], 0.1);
+  ASSERT_EQ(run("sphere lambert --environment room.exr --size 32 --threads 1 -o b.png").code, 0);
+  ASSERT_EQ(run("sphere lambert --environment room.exr --size 32 -o c.png").code, 0);
+  EXPECT_EQ(content(folder_ / "b.png"), content(folder_ / "c.png"));
+  const Json pair = json(
+      "sphere lambert --area 40,120,8 --against lambert --against-set albedo=0.4 --difference d.png "
+      "--size 32 -o d.exr");
+  EXPECT_GT(pair["against"]["flip_mean"], 0.01);
+  EXPECT_TRUE(content(folder_ / "d.png").starts_with("\x89PNG"));
+  EXPECT_EQ(json("sphere eon --against eon --size 16 -o same.png")["against"]["delta_e_itp_mean"], 0.0);
+
+  expect_refused("sphere lambert --environment none.exr -o e.png", 3, {"none.exr"});
+  expect_refused("sphere lambert --environment b.png -o e.png", 3, {"b.png", "twice as wide as high"});
+  expect_refused("sphere lambert --difference e.exr -o e.png", 2, {"--difference", "--against"});
+  expect_refused("sphere lambert --area 1,2 -o e.png", 2, {"--area", "THETA,PHI,RADIUS"});
+  expect_refused("sphere lambert --area 1,2,0 -o e.png", 2, {"radius", "90"});
+  EXPECT_FALSE(fs::exists(folder_ / "e.png"));
 }
 
 TEST_F(CommandLine, ModelsDescribeThemselves) {

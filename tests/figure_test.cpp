@@ -16,7 +16,9 @@
 #include <vector>
 
 #include "models/error.h"
+#include "models/model.h"
 #include "reference/output_file.h"
+#include "report/image_slice.h"
 #include "report/material_figure.h"
 #include "report/pareto_figure.h"
 
@@ -65,7 +67,7 @@ std::vector<std::vector<double>> block(const std::string& program, const std::st
   while (std::getline(lines, line) && line != "EOD") {
     std::istringstream numbers(line);
     result.emplace_back();
-    for (double number; numbers >> number;) result.back().push_back(number);
+    for (std::string number; numbers >> number;) result.back().push_back(std::stod(number));  // NaN too
   }
   return result;
 }
@@ -398,6 +400,58 @@ TEST(ParetoFigure, HoldsItsNumbersAndNamesEveryPoint) {
     EXPECT_EQ(block(program, name), (std::vector<std::vector<double>>{{10, 0.2}, {10.5, 0.2}, {20, 0.3}}));
   EXPECT_EQ(block(program, "front_1"), (std::vector<std::vector<double>>{{10, 0.2}}));
   for (const char* label : {"'one''s'", "'two'", "'three'"}) EXPECT_NE(program.find(label), std::string::npos) << label;
+}
+
+// ---- Image slices -----------------------------------------------------------------------------------------------
+
+std::vector<double> cells(const std::string& program, const std::string& name) {
+  std::vector<double> values;
+  for (const std::vector<double>& line : block(program, name)) values.insert(values.end(), line.begin(), line.end());
+  return values;
+}
+
+TEST(ImageSlice, ShowsLogarithmsOverHalfAndDifferenceAngles) {
+  const auto constant = [](double f) {
+    return [f](const Direction&, const Direction&) { return std::optional<Rgb>(grey(f)); };
+  };
+  const auto of_vectors = [](const Direction& wi, const Direction& wo) {
+    const Direction h = normalize(wi + wo);
+    return std::optional<Rgb>(grey(std::exp2(2.0 * h.z * h.z - dot(h, wi)) / pi));
+  };
+  const std::string program =
+      image_slice_figure({{"one", constant(1.0 / pi)}, {"half", constant(0.5 / pi)}, {"angles", of_vectors}},
+                         {.phi_d = 90.0, .steps = 6}, "slices");
+  const std::vector<double> one = cells(program, "slice_1"), half = cells(program, "ratio_2"),
+                            values = cells(program, "ratio_3");
+  ASSERT_EQ(one.size(), 36u);
+  ASSERT_EQ(half.size(), 36u);
+  ASSERT_EQ(values.size(), 36u);
+  EXPECT_EQ(program.find("$ratio_1 "), std::string::npos);
+  for (std::size_t k = 0; k < 36; ++k) {
+    // At phi_d = 90° both directions have the cosine cos theta_h cos theta_d: all pairs are above the surface.
+    EXPECT_EQ(one[k], 0.0);
+    EXPECT_EQ(half[k], -1.0);
+    const double theta_h = radians(15.0 * static_cast<double>(k % 6) + 7.5);
+    const double theta_d = radians(15.0 * static_cast<double>(k / 6) + 7.5);
+    EXPECT_NEAR(values[k], 2.0 * square(std::cos(theta_h)) - std::cos(theta_d), 1e-3);
+  }
+  // In the plane of incidence the pair leaves the hemisphere where theta_h + theta_d exceed 90°.
+  const std::vector<double> plane =
+      cells(image_slice_figure({{"one", constant(1.0 / pi)}}, {.phi_d = 0.0, .steps = 7}, "plane"), "slice_1");
+  ASSERT_EQ(plane.size(), 49u);
+  for (std::size_t k = 0; k < 49; ++k) {
+    const std::size_t sum = k % 7 + k / 7 + 1;  // 7: on the horizon
+    if (sum != 7) {
+      EXPECT_EQ(std::isnan(plane[k]), sum > 7) << k;
+    }
+  }
+}
+
+TEST(ImageSlice, RefusesNothing) {
+  const auto black = [](const Direction&, const Direction&) { return std::optional<Rgb>(); };
+  EXPECT_THROW(image_slice_figure({}, {}, ""), Error);
+  EXPECT_THROW(image_slice_figure({{"black", black}}, {}, ""), Error);
+  EXPECT_THROW(image_slice_figure({{"black", black}}, {.phi_d = 200.0}, ""), Error);
 }
 
 }  // namespace
