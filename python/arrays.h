@@ -1,0 +1,49 @@
+// NumPy arrays and parameters on their way into the library. What is wrong with shapes is told in Python (lobefit/
+// arrays.py); here numbers are looked at.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <cstddef>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+
+#include "models/geometry.h"
+#include "models/parameter.h"
+
+namespace lobefit::python {
+
+namespace py = pybind11;
+
+/// A view of (n, 3) directions, float or double, any strides; the array must outlive it.
+class Directions {
+ public:
+  Directions(const py::array& array, std::string name);
+
+  std::size_t size() const { return size_; }
+  /// Directions first, …, as many as `out`. Throws Error(usage) for one that is not a unit vector.
+  void read(std::size_t first, std::span<Direction> out) const;
+
+ private:
+  template <class Number>
+  void read_as(std::size_t first, std::span<Direction> out) const;
+
+  std::string name_;
+  const char* data_;
+  std::size_t size_;
+  std::ptrdiff_t row_, column_;  // bytes
+  bool single_;
+};
+
+/// "0.5", "0.1,0.2,0.3" or a choice, as the command line has them.
+std::string setting_text(const py::handle& value);
+/// Sets those of a dict; throws Error(usage).
+void set_parameters(ParameterValues& values, const py::dict& parameters);
+
+/// Python's dict or list of a document.
+py::object to_python(const nlohmann::ordered_json& json);
+
+}  // namespace lobefit::python
