@@ -1,8 +1,11 @@
 #include "python/arrays.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "models/error.h"
+#include "models/instruction_sets.h"
 
 namespace lobefit::python {
 
@@ -14,37 +17,95 @@ Directions::Directions(const py::array& array, std::string name)
       column_(array.strides(1)),
       single_(array.itemsize() == sizeof(float)) {}
 
+namespace {
+
+constexpr float tolerance = 1e-5f;  // of a length's square: unit vectors in float pass
+
 template <class Number>
-void Directions::read_as(std::size_t first, std::span<Direction> out) const {
-  const char* row = data_ + static_cast<std::ptrdiff_t>(first) * row_;
-  const auto number = [&](std::ptrdiff_t column) {
-    Number value;
-    std::memcpy(&value, row + column * column_, sizeof(value));
-    return static_cast<double>(value);
-  };
-  double worst = 0.0;
-  for (std::size_t i = 0; i < out.size(); ++i, row += row_) {
-    out[i] = {number(0), number(1), number(2)};
-    const double off = std::abs(dot(out[i], out[i]) - 1.0);
-    worst = off <= worst ? worst : off;  // NaN counts
+bool is_unit(Number x, Number y, Number z) {
+  return std::abs(x * x + y * y + z * z - Number(1)) <= Number(tolerance);  // NaN is not
+}
+
+/// Rows that lie close together, to float. Returns whether all of them are unit vectors.
+LOBEFIT_CLONES [[gnu::noinline]] bool split_floats(const float* __restrict rows, std::size_t n, float* __restrict x,
+                                                   float* __restrict y, float* __restrict z) {
+  int bad = 0;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < n; ++i) {
+    x[i] = rows[3 * i];
+    y[i] = rows[3 * i + 1];
+    z[i] = rows[3 * i + 2];
+    bad |= is_unit(x[i], y[i], z[i]) ? 0 : 1;
   }
-  constexpr double tolerance = 1e-5;  // of a length's square: unit vectors in float pass
-  if (worst <= tolerance) return;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    if (std::abs(dot(out[i], out[i]) - 1.0) <= tolerance) continue;
+  return bad == 0;
+}
+
+LOBEFIT_CLONES [[gnu::noinline]] void join_floats(const float* __restrict r, const float* __restrict g,
+                                                  const float* __restrict b, std::size_t n, float* __restrict out) {
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < n; ++i) {
+    out[3 * i] = r[i];
+    out[3 * i + 1] = g[i];
+    out[3 * i + 2] = b[i];
+  }
+}
+
+}  // namespace
+
+template <class Number, class Store>
+bool Directions::read_as(const char* row, std::size_t n, Store&& store) const {
+  bool good = true;
+  for (std::size_t i = 0; i < n; ++i, row += row_) {
+    Number w[3];
+    for (int c = 0; c < 3; ++c) std::memcpy(&w[c], row + c * column_, sizeof(Number));
+    good = is_unit(w[0], w[1], w[2]) && good;
+    store(i, w);
+  }
+  return good;
+}
+
+template <class Store>
+void Directions::read_all(std::size_t first, std::size_t n, Store&& store) const {
+  const char* row = data_ + static_cast<std::ptrdiff_t>(first) * row_;
+  if (!(single_ ? read_as<float>(row, n, store) : read_as<double>(row, n, store))) refuse(first, n);
+}
+
+void Directions::read(std::size_t first, std::span<Direction> out) const {
+  read_all(first, out.size(), [&](std::size_t i, const auto* w) { out[i] = {w[0], w[1], w[2]}; });
+}
+
+void Directions::read(std::size_t first, std::span<float> x, std::span<float> y, std::span<float> z) const {
+  const char* row = data_ + static_cast<std::ptrdiff_t>(first) * row_;
+  const bool close = single_ && row_ == 3 * sizeof(float) && column_ == sizeof(float);
+  if (close && reinterpret_cast<std::uintptr_t>(row) % alignof(float) == 0) {
+    if (!split_floats(reinterpret_cast<const float*>(row), x.size(), x.data(), y.data(), z.data()))
+      refuse(first, x.size());
+    return;
+  }
+  read_all(first, x.size(), [&](std::size_t i, const auto* w) {
+    x[i] = static_cast<float>(w[0]);
+    y[i] = static_cast<float>(w[1]);
+    z[i] = static_cast<float>(w[2]);
+  });
+}
+
+void Directions::refuse(std::size_t first, std::size_t n) const {
+  const char* row = data_ + static_cast<std::ptrdiff_t>(first) * row_;
+  for (std::size_t i = 0; i < n; ++i, row += row_) {
+    double found[3];
+    const auto one = [&](std::size_t, const auto* w) { std::copy_n(w, 3, found); };
+    if (single_ ? read_as<float>(row, 1, one) : read_as<double>(row, 1, one)) continue;
     throw Error(ExitCode::usage,
-                "(" + std::to_string(out[i].x) + ", " + std::to_string(out[i].y) + ", " + std::to_string(out[i].z) +
+                "(" + number_text(found[0]) + ", " + number_text(found[1]) + ", " + number_text(found[2]) +
                     ") is not a unit vector",
                 name_ + ", direction " + std::to_string(first + i),
                 "normalise it, or make directions of angles by lobefit.directions(theta, phi)");
   }
+  throw Error(ExitCode::failure, "directions changed while they were read", name_, "evaluate a copy");
 }
 
-void Directions::read(std::size_t first, std::span<Direction> out) const {
-  if (single_)
-    read_as<float>(first, out);
-  else
-    read_as<double>(first, out);
+void join_channels(std::span<const float> r, std::span<const float> g, std::span<const float> b, float* out) {
+  join_floats(r.data(), g.data(), b.data(), r.size(), out);
 }
 
 std::string setting_text(const py::handle& value) {

@@ -26,10 +26,15 @@ class Directions {
   std::size_t size() const { return size_; }
   /// Directions first, …, as many as `out`. Throws Error(usage) for one that is not a unit vector.
   void read(std::size_t first, std::span<Direction> out) const;
+  /// The same rounded to float, one array per component.
+  void read(std::size_t first, std::span<float> x, std::span<float> y, std::span<float> z) const;
 
  private:
-  template <class Number>
-  void read_as(std::size_t first, std::span<Direction> out) const;
+  template <class Store>
+  void read_all(std::size_t first, std::size_t n, Store&& store) const;
+  template <class Number, class Store>
+  bool read_as(const char* row, std::size_t n, Store&& store) const;
+  [[noreturn]] void refuse(std::size_t first, std::size_t n) const;
 
   std::string name_;
   const char* data_;
@@ -37,6 +42,9 @@ class Directions {
   std::ptrdiff_t row_, column_;  // bytes
   bool single_;
 };
+
+/// (n, 3) numbers from n of each channel.
+void join_channels(std::span<const float> r, std::span<const float> g, std::span<const float> b, float* out);
 
 /// "0.5", "0.1,0.2,0.3" or a choice, as the command line has them.
 std::string setting_text(const py::handle& value);

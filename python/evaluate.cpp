@@ -2,7 +2,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 
 #include "cli/shader_text.h"
 #include "evaluate/description.h"
@@ -18,7 +17,7 @@ namespace lobefit::python {
 
 namespace {
 
-constexpr std::size_t block_size = 2048;     // pairs; their directions and values stay in a core's cache
+constexpr std::size_t block_size = 512;      // pairs; their directions and values stay in the nearest cache
 constexpr std::size_t short_work = 1 << 16;  // pairs: over before anybody would stop it
 
 /// Flat parameters, of which some differ from pair to pair.
@@ -33,8 +32,9 @@ class PairParameters {
   std::vector<double> flat() const { return {values_.flat().begin(), values_.flat().end()}; }
   /// How many pairs from `first` on, `most` at most, have the same parameters.
   std::size_t run(std::size_t first, std::size_t most) const {
+    if (varying_.empty()) return most;
     std::size_t length = 1;
-    while (length < most && (varying_.empty() || same(first, first + length))) ++length;
+    while (length < most && same(first, first + length)) ++length;
     return length;
   }
   void set(std::size_t pair, std::vector<double>& flat) const {
@@ -67,43 +67,46 @@ class PairParameters {
   std::vector<Varying> varying_;
 };
 
-/// Pairs first, …, first + n - 1 in double, to n × 3 numbers.
-void evaluate_block(const Model& model, const PairParameters& parameters, std::size_t first,
-                    std::span<const Direction> wi, std::span<const Direction> wo, double* out) {
-  std::array<Rgb, block_size> values;
+/// Pairs first, …, first + n - 1 to n × 3 numbers: in double.
+void evaluate_block(const Model& model, const PairParameters& parameters, const Directions& wi, const Directions& wo,
+                    std::size_t first, std::size_t n, double* out) {
+  thread_local std::vector<Direction> lights(block_size), views(block_size);
+  thread_local std::vector<Rgb> values(block_size);
+  const std::span<Direction> light(lights.data(), n), view(views.data(), n);
+  wi.read(first, light);
+  wo.read(first, view);
   std::vector<double> flat = parameters.flat();
-  for (std::size_t begin = 0; begin < wi.size();) {
-    const std::size_t n = parameters.run(first + begin, wi.size() - begin);
+  for (std::size_t begin = 0; begin < n;) {
+    const std::size_t run = parameters.run(first + begin, n - begin);
     parameters.set(first + begin, flat);
-    model.evaluate_all(flat, wi.subspan(begin, n), wo.subspan(begin, n), std::span(values).subspan(begin, n));
-    begin += n;
+    model.evaluate_all(flat, light.subspan(begin, run), view.subspan(begin, run),
+                       std::span(values).subspan(begin, run));
+    begin += run;
   }
-  std::memcpy(out, values.data(), wi.size() * sizeof(Rgb));
+  std::memcpy(out, values.data(), n * sizeof(Rgb));
 }
 
-/// The same by the vectorised float batch.
-void evaluate_block(const Model& model, const PairParameters& parameters, std::size_t first,
-                    std::span<const Direction> wi, std::span<const Direction> wo, float* out) {
-  const FloatModel& batch = find_float_model(model.info->name);
+/// By the vectorised float batch.
+void evaluate_block(const FloatModel& model, const PairParameters& parameters, const Directions& wi,
+                    const Directions& wo, std::size_t first, std::size_t n, float* out) {
   thread_local FloatPairs pairs(block_size);
   thread_local FloatRgb values(block_size);
-  for (std::size_t i = 0; i < wi.size(); ++i) pairs.set(i, wi[i], wo[i]);
+  const auto all = [n](std::vector<float>& component) { return std::span(component).first(n); };
+  wi.read(first, all(pairs.wi_x), all(pairs.wi_y), all(pairs.wi_z));
+  wo.read(first, all(pairs.wo_x), all(pairs.wo_y), all(pairs.wo_z));
   std::vector<double> flat = parameters.flat();
-  for (std::size_t begin = 0; begin < wi.size();) {
-    const std::size_t end = begin + parameters.run(first + begin, wi.size() - begin);
+  for (std::size_t begin = 0; begin < n;) {
+    const std::size_t end = begin + parameters.run(first + begin, n - begin);
     parameters.set(first + begin, flat);
-    batch.evaluate(std::vector<float>(flat.begin(), flat.end()), pairs, begin, end, values);
+    model.evaluate(std::vector<float>(flat.begin(), flat.end()), pairs, begin, end, values);
     begin = end;
   }
-  for (std::size_t i = 0; i < wi.size(); ++i) {
-    out[3 * i] = values.r[i];
-    out[3 * i + 1] = values.g[i];
-    out[3 * i + 2] = values.b[i];
-  }
+  join_channels(all(values.r), all(values.g), all(values.b), out);
 }
 
-template <class Number>
-py::array evaluate_in(const Model& model, const PairParameters& parameters, const Directions& wi,
+/// `model`: a Model for double, a FloatModel for float.
+template <class Number, class AnyModel>
+py::array evaluate_in(const AnyModel& model, const PairParameters& parameters, const Directions& wi,
                       const Directions& wo) {
   const std::size_t count = wi.size();
   py::array_t<Number> result({count, std::size_t{3}});
@@ -112,10 +115,7 @@ py::array evaluate_in(const Model& model, const PairParameters& parameters, cons
     tbb::parallel_for(std::size_t{0}, (count + block_size - 1) / block_size, [&](std::size_t block) {
       monitor.check();
       const std::size_t first = block * block_size, n = std::min(block_size, count - first);
-      std::array<Direction, block_size> lights, views;
-      wi.read(first, std::span(lights).first(n));
-      wo.read(first, std::span(views).first(n));
-      evaluate_block(model, parameters, first, std::span(lights).first(n), std::span(views).first(n), out + 3 * first);
+      evaluate_block(model, parameters, wi, wo, first, n, out + 3 * first);
     });
   };
   if (count > short_work) {
@@ -133,7 +133,7 @@ py::array evaluate_model(const std::string& name, const py::array& wi, const py:
   const Model& model = find_model(name);
   const PairParameters parameters(model, constant, varying);
   const Directions lights(wi, "wi"), views(wo, "wo");
-  return single ? evaluate_in<float>(model, parameters, lights, views)
+  return single ? evaluate_in<float>(find_float_model(name), parameters, lights, views)
                 : evaluate_in<double>(model, parameters, lights, views);
 }
 
