@@ -98,15 +98,18 @@ void write(const BrdfFile& file, const std::string& path, bool overwrite) {
 
 py::dict report(const TableComparison& comparison, const std::string& weights, int sphere) {
   const Table& table = comparison.table();
-  Json result;
   const std::vector<WeightFactor> factors = parse_weights(weights);
-  for (std::size_t q = 0; q < quantity_names.size(); ++q) {
-    const auto quantity = static_cast<Quantity>(q);
-    result["metrics"][std::string(quantity_names[q])] =
-        rms_difference(table, comparison.values(), quantity, entry_weights(table, factors, quantity));
-  }
+  Json result;
   run_interruptibly(py::none(), [&](Monitor&) {
-    result["report"] = metrics_report(comparison.pair(), {.sphere_size = sphere}).json(table);
+    const MetricsReport metrics = metrics_report(comparison.pair(), {.sphere_size = sphere});
+    for (std::size_t q = 0; q < quantity_names.size(); ++q) {
+      const auto quantity = static_cast<Quantity>(q);
+      result["metrics"][std::string(quantity_names[q])] =
+          factors.empty()
+              ? metrics.brdf.rms[q].uniform
+              : rms_difference(table, comparison.values(), quantity, entry_weights(table, factors, quantity));
+    }
+    result["report"] = metrics.json(table);
   });
   return to_python(result);
 }
