@@ -307,7 +307,11 @@ class Tables(Folder):
         own.write(copy)
         again = command_json("table", "info", str(copy))
         self.assertEqual(again, own.describe())
-        self.assertIn("lobefit.render('microfacet_diffuse'", again["provenance"]["command"])
+        self.assertEqual(
+            again["provenance"]["command"],
+            "lobefit.render('microfacet_diffuse', grid='small', axes={'alpha': [0.1, 1.0]}, samples=256, seed=5, "
+            "masking='area_mean')",
+        )
         self.assert_error(2, "exists", lambda: own.write(copy))
         own.write(copy, force=True)
         self.assert_error(3, "no such file", lambda: lobefit.table(self.folder / "nothing.exr"))
@@ -392,6 +396,10 @@ class Fits(Folder):
             self.assertTrue(found.parameters[name].free)
         self.assertFalse(found.parameters["alpha"].free)
         self.assertEqual(found.values["alpha"], 0.4)
+        self.assertEqual(
+            found.document["provenance"]["command"],
+            "lobefit.fit('proxima', table, free=['a=-0.5', 'b', 'albedo'], fix=['alpha=0.4'], metric='brdf')",
+        )
         self.assertLess(found.metrics["brdf"], 1e-6)
         self.assertEqual(found.correlation.shape, (3, 3))
         np.testing.assert_allclose(np.diag(found.correlation), 1.0)
@@ -405,7 +413,8 @@ class Fits(Folder):
     def test_the_command_line_finds_the_same_bits(self):
         table, path = self.folder / "truth.exr", self.folder / "fit.json"
         lobefit.render("microfacet_diffuse", grid="small", axes={"alpha": [0.3, 0.8]}, samples=512).write(table)
-        command("fit", "proxima", str(table), "--free", "a,b", "--metric", "cosine", "--holdout", "0.2", "-o", str(path))
+        options = ["--free", "a,b", "--metric", "cosine", "--holdout", "0.2"]
+        command("fit", "proxima", str(table), *options, "-o", str(path))
         own, told = lobefit.fit("proxima", table, free=["a", "b"], metric="cosine", holdout=0.2), lobefit.read_fit(path)
         self.assertEqual(own.parameters, told.parameters)
         self.assertGreater(own.parameters["a"].stderr, 0.0)

@@ -67,7 +67,9 @@ def render(
     command: str,
     progress: _Progress,
 ) -> File: ...
-def table_of_grid(grid: Any, channels: int, values: _Numbers, stderr: Optional[_Numbers], valid: Optional[_Numbers]) -> File: ...
+def table_of_grid(
+    grid: Any, channels: int, values: _Numbers, stderr: Optional[_Numbers], valid: Optional[_Numbers]
+) -> File: ...
 def table_of_directions(
     wi: _Numbers,
     wo: _Numbers,

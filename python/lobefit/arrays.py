@@ -32,6 +32,12 @@ def number_array(value: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
     return array if array.dtype == np.float32 else array.astype(np.float64, copy=False)
 
 
+def call_text(function: str, first: Sequence[str], given: Mapping[str, Any], defaults: Mapping[str, Any]) -> str:
+    """A call as provenance records it: what is not the default."""
+    said = [f"{name}={value!r}" for name, value in given.items() if name not in defaults or value != defaults[name]]
+    return f"lobefit.{function}({', '.join([*first, *said])})"
+
+
 def direction_array(value: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
     """An array of directions of shape (..., 3)."""
     array = number_array(value, name)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lobefit
-from .arrays import Array, Value, usage_error
+from .arrays import Array, Value, call_text, usage_error
 from .models import Model, Progress
 from .models import model as find_model
 from .tables import Path, Table, table as read_table
@@ -207,10 +207,9 @@ def fit(
         intervals=intervals,
         holdout=holdout,
     )
-    said = "".join(f", {key}={value!r}" for key, value in settings.items() if value not in ([], None, ""))
-    document, summary = _lobefit.fit(
-        name, given._file, settings, seed, f"lobefit.fit({name!r}, table{said})", given.path or "", progress
-    )
+    defaults: dict[str, Any] = {**fit.__kwdefaults__, "free": [], "fix": [], "bounds": [], "map": []}
+    command = call_text("fit", [repr(name), "table"], settings, defaults)
+    document, summary = _lobefit.fit(name, given._file, settings, seed, command, given.path or "", progress)
     return Fit(document, summary=summary)
 
 

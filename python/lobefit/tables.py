@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _lobefit
-from .arrays import Array, Value, broadcast_shapes, direction_array, number_array, rows, usage_error
+from .arrays import Array, Value, broadcast_shapes, call_text, direction_array, number_array, rows, usage_error
 from .models import Model, Progress, Reference
 
 Path = Union[str, "os.PathLike[str]"]
@@ -34,8 +34,9 @@ class Table:
     """BRDF values in 1/sr without cosine over a grid, with their errors and provenance. Arrays are read-only views.
 
     `lobefit.table` reads one, `lobefit.render` makes one, `Table.of_grid` and `Table.of_directions` take your own
-    numbers. Axes come in the order of the arrays' dimensions: parameters, then theta_o, theta_i, phi (degrees). Measured
-    files keep their own coordinates: Rusinkiewicz angles, or a `list` of entries; `directions()` tells them all.
+    numbers. Axes come in the order of the arrays' dimensions: parameters, then theta_o, theta_i, phi (degrees).
+    Measured files keep their own coordinates: Rusinkiewicz angles, or a `list` of entries; `directions()` tells them
+    all.
     """
 
     def __init__(self, file: _lobefit.File, path: Optional[str] = None) -> None:
@@ -260,15 +261,16 @@ def render(
     exact       instead: by quadrature, where the reference has it. Models are always exact
     orders      keep the orders of scattering apart (in the file that write() makes)
     sampler     "sobol" or "philox"
-    facets      "shared": one facet set for all lights of a line, fast, their errors correlated (replicates are kept, and
-                fits propagate them); "independent"
+    facets      "shared": one facet set for all lights of a line, fast, their errors correlated (replicates are kept,
+                and fits propagate them); "independent"
     progress    called with the fraction done and what is being done; False stops with Interrupted
     parameters  of the reference or model, as in evaluate(), the same for all entries
 
     The same arguments give the same bits for any number of threads.
     """
     name = source if isinstance(source, str) else source.name
-    for option, value, choices in (("sampler", sampler, ("sobol", "philox")), ("facets", facets, ("shared", "independent"))):
+    known = (("sampler", sampler, ("sobol", "philox")), ("facets", facets, ("shared", "independent")))
+    for option, value, choices in known:
         if value not in choices:
             raise usage_error(f"unknown {option} {value!r}", f"choose {' or '.join(choices)}")
     lists = {axis: number_array(values, axis).reshape(-1).tolist() for axis, values in (axes or {}).items()}
@@ -276,10 +278,10 @@ def render(
         if not values:
             raise usage_error(f"axis {axis!r} is empty", "give it values")
     if not isinstance(grid, str):
-        grid = {key: value if isinstance(value, bool) else number_array(value, key).tolist() for key, value in grid.items()}
-    options = dict(
+        grid = {name: x if isinstance(x, bool) else number_array(x, name).tolist() for name, x in grid.items()}
+    options: dict[str, Any] = dict(
         samples=samples, stderr=stderr, exact=exact, orders=orders, sampler=sampler, facets=facets, seed=seed
     )
-    said = [repr(name)] + [f"{key}={value!r}" for key, value in {"grid": grid, "axes": lists, **options, **parameters}.items()]
-    command = f"lobefit.render({', '.join(said)})"
+    given: dict[str, Any] = {"grid": grid, "axes": lists or None, **options, **parameters}
+    command = call_text("render", [repr(name)], given, render.__kwdefaults__)
     return Table(_lobefit.render(name, grid, parameters, lists, options, command, progress))
