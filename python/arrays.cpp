@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "models/error.h"
 #include "models/instruction_sets.h"
@@ -124,6 +123,15 @@ std::string setting_text(const py::handle& value) {
     text += (i > 0 ? "," : "") + number_text(number);
   }
   return text;
+}
+
+std::uint64_t counting_number(const py::handle& value, const std::string& name) {
+  // What NumPy calls an integer has __index__ too.
+  const auto index = py::reinterpret_steal<py::object>(PyNumber_Index(value.ptr()));
+  const unsigned long long number = index ? PyLong_AsUnsignedLongLong(index.ptr()) : 0;
+  if (PyErr_Occurred() == nullptr) return number;
+  PyErr_Clear();
+  throw Error(ExitCode::usage, "'" + py::repr(value).cast<std::string>() + "' is no whole number from 0 on", name, "");
 }
 
 void set_parameters(ParameterValues& values, const py::dict& parameters) {

@@ -6,6 +6,7 @@
 #include <pybind11/pybind11.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -48,6 +49,8 @@ void join_channels(std::span<const float> r, std::span<const float> g, std::span
 
 /// "0.5", "0.1,0.2,0.3" or a choice, as the command line has them.
 std::string setting_text(const py::handle& value);
+/// A whole number from 0 on; throws Error(usage).
+std::uint64_t counting_number(const py::handle& value, const std::string& name);
 /// Sets those of a dict; throws Error(usage).
 void set_parameters(ParameterValues& values, const py::dict& parameters);
 

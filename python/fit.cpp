@@ -13,7 +13,14 @@ namespace {
 
 FitSettings settings_of(const Model& model, const py::dict& given) {
   FitSettings settings{.model = &model};
-  const auto take = [&]<class Member>(const char* name, Member& member) { member = given[name].cast<Member>(); };
+  const auto take = [&]<class Member>(const char* name, Member& member) {
+    try {
+      member = given[name].cast<Member>();
+    } catch (const py::cast_error&) {
+      throw Error(ExitCode::usage, "'" + py::repr(given[name]).cast<std::string>() + "' has the wrong type", name,
+                  "see help(lobefit.fit)");
+    }
+  };
   take("tier", settings.tier);
   take("metric", settings.metric);
   take("weights", settings.weights);
@@ -39,16 +46,17 @@ FitSettings settings_of(const Model& model, const py::dict& given) {
 }
 
 /// The document and its text for people.
-py::tuple fit_table_to(const std::string& name, const BrdfFile& file, const py::dict& given, std::uint64_t seed,
+py::tuple fit_table_to(const std::string& name, const BrdfFile& file, const py::dict& given, const py::object& seed,
                        const std::string& command, const std::string& path, const py::object& progress) {
   const FitSettings settings = settings_of(find_model(name), given);
+  const std::uint64_t first_seed = counting_number(seed, "seed");
   const std::string sha256 = path.empty() ? "" : sha256_of_file(path);
   TableFit result;
   std::string grid;
   run_interruptibly(progress, [&](Monitor& monitor) {
     const FitTable taken = fit_table(file, settings.grid, settings.weights);
     grid = taken.grid;
-    result = fit_as_set(settings, taken, seed, monitor);
+    result = fit_as_set(settings, taken, first_seed, monitor);
   });
   Json document = result.fit.json(command, sha256);
   if (!path.empty()) document["provenance"]["table"] = path;

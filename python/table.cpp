@@ -148,8 +148,8 @@ RenderOptions render_options(const py::dict& options) {
                        .orders = options["orders"].cast<bool>(),
                        .shared_facets = options["facets"].cast<std::string>() == "shared"};
   SamplingOptions& sampling = result.sampling;
-  sampling.seed = options["seed"].cast<std::uint64_t>();
-  sampling.samples = options["samples"].cast<std::uint64_t>();
+  sampling.seed = counting_number(options["seed"], "seed");
+  sampling.samples = counting_number(options["samples"], "samples");
   sampling.sampler = options["sampler"].cast<std::string>() == "sobol" ? Sampler::sobol : Sampler::philox;
   if (!(sampling.samples >= replicate_count && sampling.samples <= most_samples)) {
     throw Error(ExitCode::usage, "samples are out of range", "render",

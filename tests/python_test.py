@@ -365,6 +365,8 @@ class Tables(Folder):
         self.assert_error(2, "empty", lambda: lobefit.render("eon", axes={"roughness": []}))
         self.assert_error(2, "out of range", lambda: lobefit.render("eon", axes={"roughness": [2]}))
         self.assert_error(2, "samples", lambda: lobefit.render("microfacet_diffuse", samples=1))
+        self.assert_error(2, "samples", lambda: lobefit.render("microfacet_diffuse", samples=-1))
+        self.assert_error(2, "seed", lambda: lobefit.render("microfacet_diffuse", seed=0.5))
         self.assert_error(2, "positive", lambda: lobefit.render("microfacet_diffuse", stderr=-1))
         self.assert_error(2, "sobol or philox", lambda: lobefit.render("microfacet_diffuse", sampler="halton"))
 
@@ -442,6 +444,8 @@ class Fits(Folder):
         self.assert_error(2, "tier", lambda: lobefit.fit("proxima", table, tier="basic"))
         self.assert_error(2, "starts", lambda: lobefit.fit("proxima", table, starts=0))
         self.assert_error(2, "holdout", lambda: lobefit.fit("proxima", table, holdout=1.5))
+        self.assert_error(2, "starts.*wrong type|wrong type.*starts", lambda: lobefit.fit("proxima", table, starts="x"))
+        self.assert_error(2, "seed", lambda: lobefit.fit("proxima", table, seed=-1))
         self.assert_error(2, "intervals", lambda: lobefit.fit("proxima", table, intervals="dat"))
         self.assert_error(2, "bounds", lambda: lobefit.fit("proxima", table, bounds={"alpha": (0.5, 3)}))
         path = self.folder / "fit.json"

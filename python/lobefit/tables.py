@@ -154,7 +154,7 @@ class Table:
 
     def row(self, **at: float) -> Table:
         """The part of a table with parameter axes that has these values of them."""
-        return Table(self._file.row(at))
+        return Table(self._file.row({axis: float(value) for axis, value in at.items()}))
 
     def evaluate(self, wi: npt.ArrayLike, wo: npt.ArrayLike, **at: float) -> Array:
         """Values at any pairs of directions, shape (..., 3), interpolated; NaN where the table has none.
@@ -163,7 +163,8 @@ class Table:
         """
         lights, views = direction_array(wi, "wi"), direction_array(wo, "wo")
         shape = broadcast_shapes({"wi": lights.shape[:-1], "wo": views.shape[:-1]})
-        return self._file.evaluate(rows(lights, shape), rows(views, shape), at).reshape(shape + (3,))
+        row = {axis: float(value) for axis, value in at.items()}
+        return self._file.evaluate(rows(lights, shape), rows(views, shape), row).reshape(shape + (3,))
 
     def compare(
         self,
