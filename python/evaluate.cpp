@@ -6,7 +6,6 @@
 #include "cli/shader_text.h"
 #include "evaluate/description.h"
 #include "evaluate/float_model.h"
-#include "evaluate/shader.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
@@ -51,6 +50,8 @@ class PairParameters {
 
   void add(const std::string& name, Rows rows) {
     const ParameterInfo& info = values_.info(name);
+    if (!info.choices.empty())
+      throw Error(ExitCode::usage, "a choice is the same for all pairs", name, "give one name");
     const auto components = static_cast<std::size_t>(info.components);
     const std::span<const double> all(rows.data(), static_cast<std::size_t>(rows.size()));
     const auto outside = std::ranges::find_if(all, [&](double x) { return !(x >= info.lower && x <= info.upper); });
@@ -165,6 +166,14 @@ py::array evaluate_reference(const std::string& name, const py::array& wi, const
   return result;
 }
 
+/// Throws Error(usage) unless `theta`, in degrees, is one; `above` the surface: below 90.
+void check_polar_angle(double theta, bool above) {
+  if (theta >= 0.0 && (above ? theta < 90.0 : theta <= 180.0)) return;
+  throw Error(ExitCode::usage, "theta = " + number_text(theta) + " is out of range", "",
+              above ? "choose an angle from 0 to below 90 degrees: directions lie above the surface"
+                    : "choose an angle from 0 to 180 degrees");
+}
+
 /// Values and errors, (angles, 3) each.
 py::tuple albedo(const std::function<Rgb(const Direction&, const Direction&)>& brdf, const std::vector<double>& angles,
                  bool fixed_light, AlbedoDomain domain) {
@@ -226,13 +235,6 @@ std::string shader(const std::string& name, const std::string& language, const p
 
 }  // namespace
 
-void check_polar_angle(double theta, bool above) {
-  if (theta >= 0.0 && (above ? theta < 90.0 : theta <= 180.0)) return;
-  throw Error(ExitCode::usage, "theta = " + number_text(theta) + " is out of range", "",
-              above ? "choose an angle from 0 to below 90 degrees: directions lie above the surface"
-                    : "choose an angle from 0 to 180 degrees");
-}
-
 void add_evaluation(py::module_& module) {
   module.def("model_names", [] {
     std::vector<std::string> names;
@@ -253,7 +255,6 @@ void add_evaluation(py::module_& module) {
   module.def("albedo_of_reference", &albedo_of_reference);
   module.def("directions", &directions);
   module.def("shader", &shader);
-  module.def("shader_languages", &shader_languages);
 }
 
 }  // namespace lobefit::python

@@ -1,5 +1,6 @@
 // Fits, as their JSON documents.
 #include "cli/fit_text.h"
+#include "cli/shader_text.h"
 #include "fit/fit_settings.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
@@ -85,11 +86,18 @@ py::dict fitted_values(const std::string& text, const std::string& place) {
   return result;
 }
 
+/// With the intervals of what was fitted.
+std::string shader_of_fit(const std::string& text, const std::string& language) {
+  const Fit fit = Fit::from_json(parse_json(text, "fit"), "fit");
+  return shader_text(find_model(fit.model), fit.values(), &fit, language, "lobefit.Fit.shader", "");
+}
+
 }  // namespace
 
 void add_fits(py::module_& module) {
   module.def("fit", &fit_table_to);
   module.def("fitted_values", &fitted_values);
+  module.def("shader_of_fit", &shader_of_fit);
   module.def("read_text", [](const std::string& path) { return read_file(path); });
   module.def("write_text", [](const std::string& text, const std::string& path, bool overwrite) {
     OutputFile file(path, overwrite);

@@ -7,14 +7,15 @@ namespace lobefit::python {
 
 namespace {
 
-/// lobefit.Error and its child lobefit.Interrupted; made once, alive as long as the interpreter.
+/// lobefit.Error and its child lobefit.Interrupted.
 struct Exceptions {
   py::object error, interrupted;
 };
 
 Exceptions& exceptions() {
-  static Exceptions all;
-  return all;
+  // Never destroyed: that would be after the interpreter's end.
+  static auto* const all = new Exceptions;
+  return *all;
 }
 
 void raise(const Error& error) {
@@ -36,9 +37,6 @@ void add_exceptions(py::module_& module) {
                            "command line has for it: 2 usage, 3 unreadable or invalid input, 1 internal, and so on.",
                            py::reinterpret_borrow<py::object>(PyExc_Exception));
   exceptions().interrupted = add("Interrupted", "`progress` returned False. `code` is 130.", exceptions().error);
-  // Never destroyed: a destructor would run after the interpreter's end.
-  exceptions().error.inc_ref();
-  exceptions().interrupted.inc_ref();
   py::register_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) std::rethrow_exception(pointer);

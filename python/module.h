@@ -12,7 +12,4 @@ void add_evaluation(py::module_& module);
 void add_tables(py::module_& module);
 void add_fits(py::module_& module);
 
-/// Throws Error(usage) unless `theta`, in degrees, is one; `above` the surface: below 90.
-void check_polar_angle(double theta, bool above);
-
 }  // namespace lobefit::python

@@ -203,6 +203,7 @@ class Models(Folder):
         self.assert_error(2, "below 90", lambda: model.albedo(90))
         karis = lobefit.model("specular_karis")
         self.assert_error(2, "ggx", lambda: karis.evaluate(up, up, distribution="gggx"))
+        self.assert_error(2, "same for all pairs", lambda: karis.evaluate(up, up, distribution=[0, 1]))
 
     def test_descriptions_are_those_of_the_command_line(self):
         told = {m["name"]: m for m in command_json("models")["models"]}
@@ -427,6 +428,13 @@ class Fits(Folder):
         own.write(copy)
         self.assertEqual(lobefit.read_fit(copy).parameters, own.parameters)
         self.assert_error(2, "exists", lambda: own.write(copy))
+        exported = command("export", str(copy), "--lang", "hlsl").splitlines()
+        lines = own.shader("hlsl").splitlines()
+        without_origin = [
+            [x for x in text if "Written by" not in x and "Fitted constants from" not in x] for text in (lines, exported)
+        ]
+        self.assertEqual(*without_origin)
+        self.assertTrue(any("95 % interval" in line for line in lines))
         of_table = lobefit.table(table).compare(own, sphere=0)["metrics"]
         self.assertEqual(of_table, command_json("table", "compare", str(table), str(copy))["metrics"])
 

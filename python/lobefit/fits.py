@@ -110,6 +110,10 @@ class Fit:
         """The fitted model, as Model.evaluate(); `parameters` are those that the table's axes set, or other values."""
         return find_model(self.model).evaluate(wi, wo, precision=precision, **{**self.values, **parameters})
 
+    def shader(self, language: str) -> str:
+        """The fitted model in a shading language, with its constants and their intervals, as lobefit.shader()."""
+        return _lobefit.shader_of_fit(self.text, language)
+
     def write(self, path: Path, *, force: bool = False) -> None:
         """Writes the JSON document, whole or not at all; every verb of the command line takes it."""
         _lobefit.write_text(self.text + "\n", os.fspath(path), force)
