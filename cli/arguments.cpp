@@ -6,6 +6,7 @@
 
 #include "reference/json_reader.h"
 #include "reference/output_file.h"
+#include "reference/table_row.h"
 
 namespace lobefit {
 
@@ -97,36 +98,14 @@ Json parameters_json(const ParameterValues& values) {
 }
 
 std::size_t find_row(const Table& table, const std::vector<std::string>& settings) {
-  std::vector<std::size_t> index(table.parameter_axes.size(), 0);
-  std::vector<bool> set(table.parameter_axes.size(), false);
+  std::vector<AxisValue> wanted;
   for (const std::string& setting : settings) {
     const std::string name = setting.substr(0, setting.find('='));
-    const auto axis = std::find_if(table.parameter_axes.begin(), table.parameter_axes.end(),
-                                   [&](const Axis& candidate) { return candidate.name == name; });
-    if (axis == table.parameter_axes.end() || name.size() + 1 >= setting.size()) {
-      throw Error(ExitCode::usage, "the table has no axis for '" + setting + "'", "--set",
-                  "`lobefit table info` lists its axes");
-    }
-    const double value = parse_number(std::string_view(setting).substr(name.size() + 1), "--set " + name);
-    const auto found = std::find_if(axis->values.begin(), axis->values.end(),
-                                    [&](double v) { return std::abs(v - value) <= 1e-9 * max(1.0, std::abs(v)); });
-    if (found == axis->values.end()) {
-      throw Error(ExitCode::usage, "the table has no row at " + setting, "--set",
-                  "choose one of the axis' values: `lobefit table info` lists them");
-    }
-    const auto number = static_cast<std::size_t>(axis - table.parameter_axes.begin());
-    index[number] = static_cast<std::size_t>(found - axis->values.begin());
-    set[number] = true;
+    if (name.size() + 1 >= setting.size())
+      throw Error(ExitCode::usage, "'" + setting + "' is not a setting", "--set", "write AXIS=VALUE");
+    wanted.push_back({name, parse_number(std::string_view(setting).substr(name.size() + 1), "--set " + name)});
   }
-  std::size_t row = 0;
-  for (std::size_t i = 0; i < index.size(); ++i) {
-    if (!set[i] && table.parameter_axes[i].size() > 1) {
-      throw Error(ExitCode::usage, "which " + table.parameter_axes[i].name + "?", "--set",
-                  "the table has an axis of it: add --set " + table.parameter_axes[i].name + "=VALUE");
-    }
-    row = row * table.parameter_axes[i].size() + index[i];
-  }
-  return row;
+  return find_row(table, wanted);
 }
 
 Source find_source(const std::string& name, const std::vector<std::string>& settings) {

@@ -17,7 +17,7 @@ namespace {
 struct FitArguments {
   std::string model, output;
   std::vector<std::string> tables, materials;
-  FitSettings settings;
+  FitJobSettings settings;
   std::string figure;
   bool resume = false, figures = false;
 };
@@ -46,7 +46,7 @@ void run_one(const FitArguments& a, const FitSource& source, const Context& cont
   std::optional<OutputFile> file;
   if (!a.output.empty()) file.emplace(a.output, context.force);
   const auto monitor = context.monitor();
-  FitSettings settings = a.settings;
+  FitJobSettings settings = a.settings;
   settings.figure = !a.figure.empty();
   const FitJob job = run_fit(settings, source, context, *monitor);
   if (file) {
@@ -82,7 +82,7 @@ void add_fit(CLI::App& app, Context& context) {
       "had\n"
       "other ranges of directions been measured.");
   const auto a = std::make_shared<FitArguments>();
-  FitSettings& settings = a->settings;
+  FitJobSettings& settings = a->settings;
   verb->add_option("MODEL", a->model, "Model: see `lobefit models`")->required();
   verb->add_option("TABLE", a->tables, "Tables or measured files (EXR, MERL, RGL, UTIA, ALTA, Klems, NBRDF weights)")
       ->required();

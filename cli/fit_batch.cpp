@@ -122,7 +122,7 @@ std::string summary_csv(const std::vector<Outcome>& outcomes) {
   return text;
 }
 
-std::string summary_markdown(const FitSettings& settings, const std::vector<Outcome>& outcomes) {
+std::string summary_markdown(const FitJobSettings& settings, const std::vector<Outcome>& outcomes) {
   std::string text = fmt::format("# {} fitted to {} materials\n\n", settings.model->info->name, outcomes.size());
   const std::vector<double> scores = metric_of(outcomes, "metrics", settings.metric);
   if (!scores.empty()) {
@@ -158,7 +158,7 @@ std::string summary_markdown(const FitSettings& settings, const std::vector<Outc
   return text;
 }
 
-Json summary_json(const FitSettings& settings, const std::vector<Outcome>& outcomes, const Context& context) {
+Json summary_json(const FitJobSettings& settings, const std::vector<Outcome>& outcomes, const Context& context) {
   Json fits = Json::array(), failures = Json::array();
   for (const Outcome& outcome : outcomes) {
     if (outcome.document.is_null()) {
@@ -208,7 +208,7 @@ void check_names(const std::vector<FitSource>& sources, const std::filesystem::p
 
 }  // namespace
 
-void run_fit_batch(const FitSettings& settings, const std::vector<FitSource>& sources,
+void run_fit_batch(const FitJobSettings& settings, const std::vector<FitSource>& sources,
                    const std::filesystem::path& folder, bool resume, const Context& context) {
   check_names(sources, folder, resume, context);
   std::error_code code;

@@ -11,7 +11,7 @@ namespace lobefit {
 /// are listed there and stop nothing. `resume` keeps fits that the folder holds from the same command and file. Throws
 /// Error(usage) where two sources have one name or a fit is there already, Error(not_converged) at the end if a fit did
 /// not converge, Error(invalid_input) if every source failed.
-void run_fit_batch(const FitSettings& settings, const std::vector<FitSource>& sources,
+void run_fit_batch(const FitJobSettings& settings, const std::vector<FitSource>& sources,
                    const std::filesystem::path& folder, bool resume, const Context& context);
 
 }  // namespace lobefit

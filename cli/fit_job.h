@@ -1,27 +1,19 @@
 // One fit as the command line asks for it: from a file to a result.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/arguments.h"
-#include "fit/tiers.h"
+#include "fit/fit_settings.h"
 #include "report/metrics_report.h"
 
 namespace lobefit {
 
-/// What `lobefit fit` was told. Empty texts and absent values mean: as suits the table.
-struct FitSettings {
-  const Model* model = nullptr;
-  std::string tier = "full", metric = "log", weights, loss = "none", grid = "auto", intervals;
-  std::vector<std::string> free, fix, bounds, mappings;
-  std::optional<int> starts;
-  std::optional<std::size_t> directions;
-  double holdout = 0.0, prior = 0.05;
-  int lobes = 2;
+/// What `lobefit fit` was told.
+struct FitJobSettings : FitSettings {
   int sphere = 64;  // pixels across the spheres of the metrics report
-  bool staged = false, not_staged = false, compare_tiers = false, figure = false, hops = false;
+  bool figure = false;
 };
 
 /// A material: a file, or one of several in a file.
@@ -30,14 +22,6 @@ struct FitSource {
 
   /// The file's name without extension, or the material's.
   std::string name() const;
-};
-
-/// A file as a fit takes it.
-struct FitTable {
-  BrdfFile file;     // its table on the grid
-  std::string grid;  // "native" or a grid's name
-  std::vector<WeightFactor> weights;
-  bool dense = false;  // a dense isotropic measurement
 };
 
 /// `grid` and `weights` as in FitSettings: "auto" and "" are as suits the file.
@@ -59,8 +43,7 @@ struct FitJob {
   Json document;
 };
 
-/// Reads, fits, and describes. Measured files go on the grid that published scores use, are fitted stage by stage from
-/// several starts, and have intervals by blocks of directions; settings come before that.
-FitJob run_fit(const FitSettings& settings, const FitSource& source, const Context& context, Monitor& monitor);
+/// Reads, fits, and describes: see fit_as_set(). Measured files go on the grid that published scores use.
+FitJob run_fit(const FitJobSettings& settings, const FitSource& source, const Context& context, Monitor& monitor);
 
 }  // namespace lobefit

@@ -4,26 +4,13 @@
 #include <iostream>
 
 #include "cli/arguments.h"
+#include "evaluate/description.h"
 #include "evaluate/float_model.h"
 #include "evaluate/operation_cost.h"
 
 namespace lobefit {
 
 namespace {
-
-Json parameter_json(const ParameterInfo& info) {
-  Json json{{"name", info.name}, {"symbol", info.symbol}, {"unit", info.unit}, {"components", info.components}};
-  if (info.choices.empty()) {
-    json["range"] = {info.lower, info.upper};
-    json["default"] = info.initial;
-  } else {
-    json["choices"] = info.choices;
-    json["default"] = info.choices[static_cast<std::size_t>(info.initial)];
-  }
-  json["tier"] = tier_name(info.tier);
-  json["doc"] = info.doc;
-  return json;
-}
 
 void print_parameters(const std::vector<ParameterInfo>& parameters) {
   fmt::print("\n  {:<22} {:<6} {:<20} {:<9} {:<9} {}\n", "parameter", "symbol", "range", "default", "tier", "meaning");
@@ -56,35 +43,6 @@ void print_tiers(const std::vector<ParameterInfo>& parameters) {
     if (!names[i].empty()) fmt::print("  {:<9} {:<35} {}\n", tier_name(tier), audiences[i], names[i]);
   }
   fmt::print("  `lobefit fit --tier TIER` frees a tier and those before it.\n");
-}
-
-Json model_json(const Model& model) {
-  const OperationCount operations = count_operations(find_float_model(model.info->name).trace());
-  Json parameters = Json::array();
-  for (const ParameterInfo& info : model.parameters) parameters.push_back(parameter_json(info));
-  return {{"name", model.info->name},
-          {"kind", kind_name(model.info->kind)},
-          {"title", model.info->title},
-          {"doc", model.info->doc},
-          {"params", parameters},
-          {"source", model.info->source},
-          {"properties",
-           {{"reciprocal", model.info->reciprocal},
-            {"energy_conserving", is_term(model.info->kind) ? Json() : Json(model.info->energy_conserving)},
-            {"isotropic", model.info->isotropic},
-            {"non_negative", model.info->non_negative},
-            {"transmits", model.info->transmits},
-            {"fibre", is_hair(model.info->kind)},
-            {"samplable", model.sample != nullptr}}},
-          {"operations",
-           {{"total", operations.total()},
-            {"add_multiply", operations.add_multiply},
-            {"divide", operations.divide},
-            {"square_root", operations.square_root},
-            {"transcendental", operations.transcendental},
-            {"compare_select", operations.compare_select},
-            {"table_read", operations.table_read},
-            {"alu_cycles", alu_cycles(operations)}}}};
 }
 
 void print_model(const Model& model) {
@@ -168,12 +126,7 @@ void add_references(CLI::App& app, Context& context) {
     Json list = Json::array();
     for (const Reference* reference : chosen) {
       if (context.json) {
-        Json parameters = Json::array();
-        for (const ParameterInfo& info : reference->parameters) parameters.push_back(parameter_json(info));
-        list.push_back({{"name", reference->name},
-                        {"doc", reference->doc},
-                        {"source", reference->source},
-                        {"params", parameters}});
+        list.push_back(reference_json(*reference));
       } else {
         fmt::print("{}: {}\n  Source: {}\n", reference->name, reference->doc, reference->source);
         print_parameters(reference->parameters);

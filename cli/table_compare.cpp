@@ -7,7 +7,7 @@
 #include "cli/metrics_text.h"
 #include "cli/slice.h"
 #include "reference/metric.h"
-#include "report/metrics_report.h"
+#include "report/table_comparison.h"
 
 namespace lobefit {
 
@@ -20,63 +20,13 @@ struct CompareArguments {
   ReportOptions report;
 };
 
-/// A file's values at a table's entries, whatever its own grid; where it has none the table is masked.
-std::vector<float> values_at_entries(const BrdfFile& file, Table& table) {
-  std::vector<float> values(table.values.size());
-  for (std::size_t entry = 0; entry < table.entries(); ++entry) {
-    if (!table.valid[entry]) continue;
-    try {
-      const Rgb f = file.evaluate(table.wi(entry), table.wo(entry));
-      const std::array<double, 3> components{f.x, f.y, f.z};
-      for (std::size_t c = 0; c < static_cast<std::size_t>(table.channels); ++c) {
-        values[c * table.entries() + entry] = static_cast<float>(components[c]);
-      }
-    } catch (const Error&) {
-      table.valid[entry] = 0;
-    }
-  }
-  return values;
+TableComparison compare(const CompareArguments& a) {
+  BrdfFile first = read_brdf_file(a.first);
+  if (is_file(a.second) && !a.second.ends_with(".json"))
+    return TableComparison(std::move(first), read_brdf_file(a.second), a.second);
+  const ModelChoice choice = choose_for_table(a.second, a.settings, a.mappings, first.table);
+  return TableComparison(std::move(first), *choice.model, choice.values, choice.mappings);
 }
-
-/// B on A's entries, and everything that the pair refers to.
-struct Comparison {
-  BrdfFile first;
-  std::optional<BrdfFile> second;
-  std::optional<ModelChoice> choice;
-  std::optional<TableModel> model;
-  std::vector<float> values;
-
-  explicit Comparison(const CompareArguments& a) : first(read_brdf_file(a.first)) {
-    Table& table = first.table;
-    if (!is_file(a.second) || a.second.ends_with(".json")) {
-      choice = choose_for_table(a.second, a.settings, a.mappings, table);
-      model.emplace(*choice->model, choice->values, table, choice->mappings);
-      values = model->render().values;
-      return;
-    }
-    second = read_brdf_file(a.second);
-    const Table& other = second->table;
-    const bool measured = table.coordinates != Coordinates::spherical || other.coordinates != Coordinates::spherical;
-    if (measured && !other.same_grid(table) && other.channels == table.channels && other.parameter_rows() == 1) {
-      values = values_at_entries(*second, table);
-    } else if (!other.same_grid(table) || other.channels != table.channels) {
-      throw Error(ExitCode::invalid_input, "the tables have different axes", a.second,
-                  "render both over the same grid; `lobefit table info` shows it");
-    } else {
-      values = other.values;
-      for (std::size_t entry = 0; measured && entry < table.entries(); ++entry)
-        table.valid[entry] &= other.valid[entry];
-    }
-  }
-  BrdfPair pair() const {
-    if (model) return model_pair(first, *model, values);
-    return {.table = &first.table,
-            .values = values,
-            .truth = row_brdf(first),
-            .other = row_brdf(*second),
-            .isotropic = is_isotropic(first.table) && is_isotropic(second->table)};
-  }
-};
 
 }  // namespace
 
@@ -108,16 +58,16 @@ void add_table_compare(CLI::App& tables, Context& context) {
   verb->callback([&context, a, tolerance] {
     const Quantity bounded = parse_quantity(a->metric);
     const std::vector<WeightFactor> weights = parse_weights(a->weights);
-    const Comparison comparison(*a);
-    const Table& table = comparison.first.table;
+    const TableComparison comparison = compare(*a);
+    const Table& table = comparison.table();
     const MetricsReport report = metrics_report(comparison.pair(), a->report);
     Json metrics = Json::object();
     double found = 0.0;
     for (std::size_t q = 0; q < quantity_names.size(); ++q) {
       const auto quantity = static_cast<Quantity>(q);
-      const double rms =
-          weights.empty() ? report.brdf.rms[q].uniform
-                          : rms_difference(table, comparison.values, quantity, entry_weights(table, weights, quantity));
+      const double rms = weights.empty() ? report.brdf.rms[q].uniform
+                                         : rms_difference(table, comparison.values(), quantity,
+                                                          entry_weights(table, weights, quantity));
       metrics[std::string(quantity_names[q])] = rms;
       if (quantity == bounded) found = rms;
     }

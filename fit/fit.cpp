@@ -51,6 +51,15 @@ void keep_signs(LeastSquaresProblem& problem, const FitVariables& variables) {
   }
 }
 
+/// Whether a minimum turns the sign of a product within one colour.
+bool breaks_signs(const Minimum& minimum, const FitVariables& variables) {
+  return std::ranges::any_of(variables.tint, [&](std::size_t slot) {
+    const auto first = minimum.x.begin() + variables.variable_of_slot[slot];
+    const auto [least, most] = std::minmax_element(first, first + 3);
+    return *least < 0.0 && *most > 0.0;
+  });
+}
+
 /// Two minima of sorted ones: the first, and the next that is not the same once more.
 void keep_best_two(std::vector<Minimum>& minima, const FitVariables& variables) {
   const Minimum& best = minima.front();
@@ -161,7 +170,7 @@ Minimum search(const Samples& samples, const ParameterValues& values, const Tabl
     start_misfits = misfits_of(minima);
     std::ranges::stable_sort(minima, is_better);
   }
-  if (staged || samples.fine) {
+  if (staged || samples.fine || breaks_signs(minima.front(), variables)) {
     keep_best_two(minima, variables);
     for (Minimum& minimum : minima) minimum = over_all(minimum.x);
   }

@@ -228,6 +228,28 @@ TEST(TableProblems, ProductsComeBackWithTheLargestChannelAtOne) {
 // Samples
 // -----------------------------------------------------------------------------------------------------------------
 
+// A tint can't turn the sign of its intensity, whatever each channel would like.
+TEST(TableProblems, ColoursKeepToOneSign) {
+  const Model& model = find_model("callisto_lambert");
+  Table table = colour_table(model, model.defaults(), grid_of(8, 8));
+  for (std::size_t c = 0; c < 3; ++c) {
+    ParameterValues channel = model.defaults();
+    channel.set("terminator", c == 0 ? -0.5 : 0.8);
+    const Table one = colour_table(model, channel, table.grid);
+    std::copy_n(one.values.begin() + static_cast<std::ptrdiff_t>(c * table.entries()), table.entries(),
+                table.values.begin() + static_cast<std::ptrdiff_t>(c * table.entries()));
+  }
+  for (const bool staged : {false, true}) {
+    const Fit found =
+        fit(model, model.defaults(), table, {.free = {"terminator", "terminator_tint"}, .staged = staged}, silent);
+    const ParameterValues values = found.values();  // throws out of range
+    const std::span<const double> tint = values.components(values.info("terminator_tint"));
+    EXPECT_GT(values.get("terminator"), 0.1);
+    EXPECT_EQ(tint[0], 0.0);
+    EXPECT_EQ(std::max(tint[1], tint[2]), 1.0);
+  }
+}
+
 TEST(EntrySamples, StandForAllEntries) {
   const Model& model = find_model("callisto");
   Table table = colour_table(model, satin(), Grid::measured());

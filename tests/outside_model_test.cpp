@@ -12,36 +12,9 @@
 #include "reference/render.h"
 #include "tests/directions.h"
 #include "tests/gauss_legendre.h"
+#include "tests/minnaert.h"
 
 namespace lobefit {
-
-/// Minnaert 1941, The Reciprocity Principle in Lunar Photometry: f = ρ (k + 1)/(2π) (μi μo)^(k - 1).
-struct Minnaert {
-  static constexpr ModelInfo info{.name = "minnaert",
-                                  .title = "Minnaert's lunar reflectance",
-                                  .source = "Minnaert 1941, The Reciprocity Principle in Lunar Photometry",
-                                  .reciprocal = true,
-                                  .energy_conserving = true,
-                                  .doc = "Lambert at k = 1; larger exponents darken the limb."};
-
-  template <class T>
-  struct Parameters {
-    Vec3<T> albedo;
-    T k;
-  };
-
-  template <class P, class Visit>
-  static constexpr void describe(P& p, Visit&& visit) {
-    visit(p.albedo, albedo_parameter);
-    visit(p.k, ParameterInfo{.name = "k", .lower = 1.0, .upper = 4.0, .initial = 1.0, .doc = "Limb exponent."});
-  }
-
-  template <class T, class G>
-  LOBEFIT_TEXT static Vec3<T> evaluate(const Parameters<T>& p, const Geometry<G>& g) {
-    const T limb = let("limb", pow(g.cos_theta_i * g.cos_theta_o, p.k - 1.0));
-    return p.albedo * ((p.k + 1.0) / (2.0 * pi) * limb);
-  }
-};
 
 namespace {
 
