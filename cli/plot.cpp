@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "cli/arguments.h"
+#include "cli/plot_convergence.h"
 #include "cli/plot_pareto.h"
 #include "cli/sampling.h"
 #include "cli/slice.h"
@@ -172,6 +173,7 @@ void add_plot(CLI::App& app, Context& context) {
       "  lobefit plot residuals truth.exr --with proxima --with eon:roughness=0.4*alpha^0.5 --phi 180 -o maps.png\n"
       "  lobefit plot slices microfacet_diffuse --axis alpha=0.1,0.5,1 --with proxima -o slices.png\n"
       "  lobefit plot image callisto --set alpha=0.3 --with unreal_default_lit:roughness=0.55 -o image.png\n"
+      "  lobefit plot convergence fit.json -o convergence.svg\n"
       "  lobefit plot pareto -o pareto.svg");
   verb->require_subcommand(1);
   const auto add = [&](const char* name, const char* description, auto figure, auto suitable_size) {
@@ -221,6 +223,7 @@ void add_plot(CLI::App& app, Context& context) {
       },
       [](const Table& t, std::size_t models, const SliceChoice& c) { return residual_figure_size(t, models, c); });
   add_image(*verb, context);
+  add_plot_convergence(*verb, context);
   add_plot_pareto(*verb, context);
 }
 

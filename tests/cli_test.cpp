@@ -549,6 +549,20 @@ TEST_F(CommandLine, ImageSlicesOfModelsAndTables) {
   expect_refused("plot image none.exr -o u.png", 3, {"none.exr"});
 }
 
+TEST_F(CommandLine, ConvergenceIsDrawnOfFits) {
+  ASSERT_EQ(run("render eon --set roughness=0.6 --grid small -o t.exr").code, 0);
+  ASSERT_EQ(run("fit proxima t.exr --free a,b -o fit.json").code, 0);
+  const Json history = Json::parse(content(folder_ / "fit.json"))["solver"]["history"];
+  ASSERT_GE(history.size(), 2u);
+  EXPECT_LT(history.back(), history.front());
+  for (const char* file : {"a.svg", "b.svg"}) {
+    ASSERT_EQ(run(std::string("plot convergence fit.json -o ") + file).code, 0);
+  }
+  EXPECT_EQ(content(folder_ / "a.svg"), content(folder_ / "b.svg"));
+  std::ofstream(folder_ / "no.json") << "{}";
+  expect_refused("plot convergence no.json -o c.svg", 3, {"no.json"});
+}
+
 TEST_F(CommandLine, ParetoRefusesBeforeItWorks) {
   expect_refused("plot pareto -o pareto.txt", 2, {"--output", ".svg"});
   expect_refused("plot pareto --samples 0", 2, {"--samples"});
