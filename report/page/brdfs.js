@@ -3,7 +3,7 @@
 // The text is that of `lobefit export`, unchanged: it is GLSL 4.50 and OpenGL ES 3.00 at once, but for the precision
 // that stands before it. World and samples of a sphere are those of `lobefit sphere`: x right, y up, z towards the
 // viewer, four samples per pixel, π f cos under one white light, 8-bit sRGB. The reference is a table over polar angles,
-// linear between them; beyond its ends the nearest entry.
+// linear between them and across the normal, beyond the last angle as there.
 
 const vertexShader = `#version 300 es
 void main() {
@@ -39,11 +39,8 @@ vec2 place(int axis, float angle) {
     return vec2(float(cell), clamp((angle - below) / (above - below), 0.0, 1.0));
 }
 
-vec3 reference(vec3 wi, vec3 wo) {
-    float sine = wi.x * wo.y - wi.y * wo.x, cosine = dot(wi.xy, wo.xy);
-    float azimuth = sine == 0.0 && cosine == 0.0 ? 0.0 : abs(atan(sine, cosine));
-    vec2 phi = place(0, degrees(azimuth));
-    vec2 i = place(1, degrees(atan(length(wi.xy), wi.z))), o = place(2, degrees(atan(length(wo.xy), wo.z)));
+vec3 between_entries(float azimuth, vec2 polar) {
+    vec2 phi = place(0, azimuth), i = place(1, polar.x), o = place(2, polar.y);
     vec4 sum = vec4(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         ivec3 bit = ivec3(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
@@ -54,6 +51,18 @@ vec3 reference(vec3 wi, vec3 wo) {
         sum += share.x * share.y * share.z * vec4(entry.rgb * entry.a, entry.a);
     }
     return sum.a > 0.0 ? sum.rgb / sum.a : vec3(0.0);
+}
+
+/** Nearer to the normal than the table's first angle: linear to the same angle beyond the normal. */
+vec3 reference(vec3 wi, vec3 wo) {
+    float sine = wi.x * wo.y - wi.y * wo.x, cosine = dot(wi.xy, wo.xy);
+    float azimuth = sine == 0.0 && cosine == 0.0 ? 0.0 : degrees(abs(atan(sine, cosine)));
+    vec2 polar = degrees(vec2(atan(length(wi.xy), wi.z), atan(length(wo.xy), wo.z)));
+    vec2 first = vec2(texelFetch(angles, ivec2(0, 1), 0).r, texelFetch(angles, ivec2(0, 2), 0).r);
+    vec2 near = 0.5 + 0.5 * clamp(polar / max(first, 1e-6), 0.0, 1.0);
+    float share = near.x * near.y + (1.0 - near.x) * (1.0 - near.y);
+    vec3 f = between_entries(azimuth, polar);
+    return share < 1.0 ? mix(between_entries(180.0 - azimuth, polar), f, share) : f;
 }
 
 vec3 value(vec3 wi, vec3 wo) {

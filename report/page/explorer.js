@@ -80,7 +80,7 @@ const explorerPanel = {
     brdfs.setReference(this.slices, row);
     byId('reference-note').textContent = this.slices ?
         `The reference is ${this.slices.label}${this.slices.rows[row] ? ', ' + this.slices.rows[row] : ''}: linear between the ` +
-        'angles of its table, beyond them as at the nearest' +
+        'angles of its table, beyond the last as there' +
         (this.slices.rows.length > 1 ? '; all follow the slider Parameters above.' : '.') : '';
     this.draw();
   },
