@@ -16,8 +16,10 @@ namespace lobefit::python {
 
 namespace {
 
-constexpr std::size_t block_size = 512;      // pairs; their directions and values stay in the nearest cache
-constexpr std::size_t short_work = 1 << 16;  // pairs: over before anybody would stop it
+constexpr std::size_t block_size = 512;  // pairs; their directions and values stay in the nearest cache
+/// So many pairs are over before anybody would stop them: a million take milliseconds in float.
+template <class Number>
+constexpr std::size_t short_work = std::is_same_v<Number, float> ? 1 << 22 : 1 << 16;
 
 /// Flat parameters, of which some differ from pair to pair.
 class PairParameters {
@@ -119,7 +121,7 @@ py::array evaluate_in(const AnyModel& model, const PairParameters& parameters, c
       evaluate_block(model, parameters, wi, wo, first, n, out + 3 * first);
     });
   };
-  if (count > short_work) {
+  if (count > short_work<Number>) {
     run_interruptibly(py::none(), work);
   } else {
     const py::gil_scoped_release released;
