@@ -25,16 +25,26 @@ bool is_unit(Number x, Number y, Number z) {
   return std::abs(x * x + y * y + z * z - Number(1)) <= Number(tolerance);  // NaN is not
 }
 
-/// Rows that lie close together, to float. Returns whether all of them are unit vectors.
-LOBEFIT_CLONES [[gnu::noinline]] bool split_floats(const float* __restrict rows, std::size_t n, float* __restrict x,
-                                                   float* __restrict y, float* __restrict z) {
+// Of rows that lie close together. Both return whether all of them are unit vectors.
+
+template <class Number>
+LOBEFIT_CLONES [[gnu::noinline]] bool are_unit(const Number* rows, std::size_t n) {
+  int bad = 0;
+#pragma GCC ivdep
+  for (std::size_t i = 0; i < n; ++i) bad |= is_unit(rows[3 * i], rows[3 * i + 1], rows[3 * i + 2]) ? 0 : 1;
+  return bad == 0;
+}
+
+template <class Number>
+LOBEFIT_CLONES [[gnu::noinline]] bool split(const Number* __restrict rows, std::size_t n, float* __restrict x,
+                                            float* __restrict y, float* __restrict z) {
   int bad = 0;
 #pragma GCC ivdep
   for (std::size_t i = 0; i < n; ++i) {
-    x[i] = rows[3 * i];
-    y[i] = rows[3 * i + 1];
-    z[i] = rows[3 * i + 2];
-    bad |= is_unit(x[i], y[i], z[i]) ? 0 : 1;
+    x[i] = static_cast<float>(rows[3 * i]);
+    y[i] = static_cast<float>(rows[3 * i + 1]);
+    z[i] = static_cast<float>(rows[3 * i + 2]);
+    bad |= is_unit(rows[3 * i], rows[3 * i + 1], rows[3 * i + 2]) ? 0 : 1;
   }
   return bad == 0;
 }
@@ -69,16 +79,31 @@ void Directions::read_all(std::size_t first, std::size_t n, Store&& store) const
   if (!(single_ ? read_as<float>(row, n, store) : read_as<double>(row, n, store))) refuse(first, n);
 }
 
+template <class Number>
+const Number* Directions::close_rows(std::size_t first) const {
+  const char* row = data_ + static_cast<std::ptrdiff_t>(first) * row_;
+  const bool close = single_ == std::is_same_v<Number, float> && row_ == 3 * sizeof(Number) &&
+                     column_ == sizeof(Number) && reinterpret_cast<std::uintptr_t>(row) % alignof(Number) == 0;
+  return close ? reinterpret_cast<const Number*>(row) : nullptr;
+}
+
 void Directions::read(std::size_t first, std::span<Direction> out) const {
+  if (const double* rows = close_rows<double>(first)) {
+    if (!are_unit(rows, out.size())) refuse(first, out.size());
+    static_assert(sizeof(Direction) == 3 * sizeof(double));
+    std::memcpy(static_cast<void*>(out.data()), rows, out.size_bytes());
+    return;
+  }
   read_all(first, out.size(), [&](std::size_t i, const auto* w) { out[i] = {w[0], w[1], w[2]}; });
 }
 
 void Directions::read(std::size_t first, std::span<float> x, std::span<float> y, std::span<float> z) const {
-  const char* row = data_ + static_cast<std::ptrdiff_t>(first) * row_;
-  const bool close = single_ && row_ == 3 * sizeof(float) && column_ == sizeof(float);
-  if (close && reinterpret_cast<std::uintptr_t>(row) % alignof(float) == 0) {
-    if (!split_floats(reinterpret_cast<const float*>(row), x.size(), x.data(), y.data(), z.data()))
-      refuse(first, x.size());
+  const float* floats = close_rows<float>(first);
+  const double* doubles = close_rows<double>(first);
+  if (floats != nullptr || doubles != nullptr) {
+    const bool good = floats != nullptr ? split(floats, x.size(), x.data(), y.data(), z.data())
+                                        : split(doubles, x.size(), x.data(), y.data(), z.data());
+    if (!good) refuse(first, x.size());
     return;
   }
   read_all(first, x.size(), [&](std::size_t i, const auto* w) {

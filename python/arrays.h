@@ -35,6 +35,9 @@ class Directions {
   void read_all(std::size_t first, std::size_t n, Store&& store) const;
   template <class Number, class Store>
   bool read_as(const char* row, std::size_t n, Store&& store) const;
+  /// Null where rows are of another type or lie apart.
+  template <class Number>
+  const Number* close_rows(std::size_t first) const;
   [[noreturn]] void refuse(std::size_t first, std::size_t n) const;
 
   std::string name_;

@@ -433,13 +433,7 @@ std::string residual_figure(const Table& reference, const std::vector<LabelledTa
   for (std::size_t line = 0; line < rows.size(); ++line) {
     for (std::size_t m = 0; m < models.size(); ++m) {
       text += panel_margins(m, line);
-      if (line == 0) {
-        text += fmt::format(
-            "column_title = {}\n"
-            "set label 5 ''.shortened(column_title, panel_width) at graph 0.5, screen down(top - 26) center "
-            "noenhanced font ''.bold(fitting(column_title, {}, panel_width))\n",
-            literal(models[m].label), label_size);
-      }
+      if (line == 0) text += column_title(models[m].label, 26);
       if (m + 1 == models.size() && !reference.parameter_axes.empty()) {
         text += fmt::format(
             "line_title = {}\n"

@@ -146,6 +146,15 @@ inline std::string panel_margins(std::size_t column, std::size_t line) {
       column, line);
 }
 
+/// Label 5: what stands `above` pixels over the panels of a column.
+inline std::string column_title(const std::string& title, int above) {
+  return fmt::format(
+      "column_title = {}\n"
+      "set label 5 ''.shortened(column_title, panel_width) at graph 0.5, screen down(top - {}) center "
+      "noenhanced font ''.bold(fitting(column_title, {}, panel_width))\n",
+      literal(title), above, label_size);
+}
+
 /// Labels of the shared axes, set once for all panels.
 inline std::string shared_axis_labels(const std::string& horizontal, const std::string& vertical) {
   return fmt::format(

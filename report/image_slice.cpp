@@ -127,13 +127,7 @@ std::string image_slice_figure(const std::vector<LabelledBrdf>& brdfs, const Ima
     }
     for (std::size_t column = line; column < slices.size(); ++column) {
       text += panel_margins(column, line);
-      if (line == 0) {
-        text += fmt::format(
-            "column_title = {}\n"
-            "set label 5 ''.shortened(column_title, panel_width) at graph 0.5, screen down(top - 16) center "
-            "noenhanced font ''.bold(fitting(column_title, {}, panel_width))\n",
-            literal(brdfs[column].label), label_size);
-      }
+      if (line == 0) text += column_title(brdfs[column].label, 16);
       text += column == line ? "set format y '%g'\n" : "set format y ''\n";
       text += line + 1 == lines || column == 0 ? "set format x '%g'\n" : "set format x ''\n";
       text += fmt::format("plot ${}_{} matrix using (($1 + 0.5) * cell):(($2 + 0.5) * cell):3 with image\n",

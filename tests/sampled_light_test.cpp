@@ -11,9 +11,8 @@
 #include <numeric>
 
 #include "models/error.h"
-#include "models/registry.h"
-#include "report/sphere.h"
 #include "tests/directions.h"
+#include "tests/spheres.h"
 
 namespace lobefit {
 namespace {
@@ -103,17 +102,6 @@ TEST(SampledLights, DensitiesAreThoseOfTheirDraws) {
   expect_density_is_normalised_and_drawn_from(DiskLight(70.0, 20.0, 25.0));
 }
 
-SphereImage render(const SphereBrdf& brdf, const Lighting& lighting, const SphereOptions& options) {
-  return render_spheres({&brdf, 1}, lighting, options).front();
-}
-SphereBrdf of_model(const std::string& name, double alpha) {
-  const Model& model = find_model(name);
-  ParameterValues values = model.defaults();
-  values.set("alpha", alpha);
-  return [&model, values](const Direction& wi, const Direction& wo) {
-    return std::optional<Rgb>(model.evaluate(values.flat(), wi, wo));
-  };
-}
 SphereBrdf lambert() {
   return [](const Direction&, const Direction&) { return std::optional<Rgb>(Rgb{1.0 / pi, 0.5 / pi, 0.1 / pi}); };
 }

@@ -12,25 +12,13 @@
 #include "report/image_difference.h"
 #include "report/metrics_report.h"
 #include "tests/directions.h"
+#include "tests/spheres.h"
 
 namespace lobefit {
 namespace {
 
 SphereBrdf lambert(double albedo) {
   return [=](const Direction&, const Direction&) { return std::optional<Rgb>(grey(albedo / pi)); };
-}
-
-SphereBrdf of_model(const std::string& name, double alpha) {
-  const Model& model = find_model(name);
-  ParameterValues values = model.defaults();
-  values.set("alpha", alpha);
-  return [&model, values](const Direction& wi, const Direction& wo) {
-    return std::optional<Rgb>(model.evaluate(values.flat(), wi, wo));
-  };
-}
-
-SphereImage render(const SphereBrdf& brdf, const Lighting& lighting, const SphereOptions& options) {
-  return render_spheres({&brdf, 1}, lighting, options).front();
 }
 
 /// What an orthographic sphere shows in the middle of a pixel.
