@@ -1,5 +1,5 @@
-// What judges shader texts: glslangValidator, for C the compilers of C and C++ with their warnings, for WGSL tint or
-// naga (neither is in Debian 12).
+// What judges shader texts: glslangValidator, for C the compilers of C and C++ with their warnings, for WGSL Chromium's
+// Tint.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,11 +11,17 @@
 #include <string>
 #include <string_view>
 
+#include "reference/json_reader.h"
+#include "reference/output_file.h"
+
 namespace lobefit {
+
+inline constexpr const char* no_shader_compiler =
+    "no compiler to judge the text: glslangValidator (Debian: glslang-tools), cc, or for WGSL chromium";
 
 inline bool has_shader_compiler(std::string_view language) {
   return std::system(language == "c"      ? "command -v cc > /dev/null"
-                     : language == "wgsl" ? "command -v tint > /dev/null || command -v naga > /dev/null"
+                     : language == "wgsl" ? "command -v chromium > /dev/null"
                                           : "command -v glslangValidator > /dev/null") == 0;
 }
 
@@ -53,14 +59,25 @@ inline std::string c_complaint(const std::string& text, const std::string& expre
   return complaint.empty() ? "" : complaint + source;
 }
 
-/// Validates a function that returns `expression` after `text`.
+/// What scripts/webgpu makes of `asked` (see there), with files that begin with `stem`.
+inline Json webgpu_results(const Json& asked, const std::string& stem) {
+  const std::string jobs = stem + "_jobs.json", results = stem + "_results.json";
+  std::ofstream(jobs) << asked;
+  const std::string complaint =
+      command_complaint(LOBEFIT_SCRIPTS "/webgpu '" + jobs + "' '" + results + "'", stem + "_webgpu");
+  EXPECT_EQ(complaint, "");
+  const Json found = complaint.empty() ? parse_json(read_file(results), results) : Json::object();
+  for (const std::string& file : {jobs, results}) std::remove(file.c_str());
+  return found;
+}
+
+/// Compiles a function that returns `expression` after `text`.
 inline std::string wgsl_complaint(const std::string& text, const std::string& expression, const std::string& name) {
-  const std::string stem = ::testing::TempDir() + "lobefit_" + name;
   const std::string source = text + "\nfn result() -> vec3f { return " + expression + "; }\n";
-  std::ofstream(stem + ".wgsl") << source;
-  const std::string complaint = command_complaint("$(command -v tint || command -v naga) '" + stem + ".wgsl'", stem);
-  std::remove((stem + ".wgsl").c_str());
-  return complaint.empty() ? "" : complaint + source;
+  const Json results = webgpu_results({{"jobs", {{{"name", name}, {"text", source}, {"flat", Json::array()}}}}},
+                                      ::testing::TempDir() + "lobefit_" + name);
+  const Json messages = results.contains(name) ? results.at(name).at("messages") : Json{"no result"};
+  return messages.empty() ? "" : messages.dump(2) + source;
 }
 
 /// Compiles a compute shader that stores `expression`, of three components, after `text`; or what c_complaint() or

@@ -250,7 +250,7 @@ TEST_P(BlendShader, StatesItsConstants) {
 
 TEST_P(BlendShader, IsAcceptedByAShaderCompiler) {
   if (!has_shader_compiler(GetParam())) {
-    GTEST_SKIP() << "no compiler to judge the text: glslangValidator (Debian: glslang-tools); cc; tint or naga";
+    GTEST_SKIP() << no_shader_compiler;
   }
   const std::string blends = blend_shader(GetParam(), FittedBlend::initial(), {});
   std::vector<ShaderParameter> parameters;

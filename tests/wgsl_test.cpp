@@ -5,9 +5,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "reference/json_reader.h"
-#include "reference/output_file.h"
 #include "tests/shader_agreement.h"
+#include "tests/shader_compiler.h"
 
 namespace lobefit {
 namespace {
@@ -70,24 +69,18 @@ class WgslRun : public ::testing::Test {
   }
   ~WgslRun() override { fs::remove_all(folder_); }
 
-  static bool has_chromium() { return std::system("command -v chromium > /dev/null") == 0; }
-
   Json run(const Json& jobs, std::span<const float> pairs) {
-    const fs::path data = folder_ / "pairs.bin", asked = folder_ / "jobs.json", results = folder_ / "results.json";
+    const fs::path data = folder_ / "pairs.bin";
     std::ofstream(data, std::ios::binary)
         .write(reinterpret_cast<const char*>(pairs.data()), static_cast<std::streamsize>(pairs.size_bytes()));
-    std::ofstream(asked) << Json{{"pairs", data.string()}, {"jobs", jobs}};
-    const std::string command =
-        std::string(LOBEFIT_SCRIPTS "/webgpu '") + asked.string() + "' '" + results.string() + "'";
-    EXPECT_EQ(std::system(command.c_str()), 0) << command;
-    return fs::exists(results) ? parse_json(read_file(results), results.string()) : Json::object();
+    return webgpu_results({{"pairs", data.string()}, {"jobs", jobs}}, (folder_ / "run").string());
   }
 
   fs::path folder_;
 };
 
 TEST_F(WgslRun, EveryModelComputesWhatItIs) {
-  if (!has_chromium()) GTEST_SKIP() << "no chromium (Debian: chromium) to compile and run WGSL";
+  if (!has_shader_compiler("wgsl")) GTEST_SKIP() << no_shader_compiler;
   const std::vector<float> pairs = float_pairs(std::size_t{1} << 12, false);
   Json jobs = Json::array();
   for (const Model& model : models()) {
@@ -117,7 +110,7 @@ TEST_F(WgslRun, EveryModelComputesWhatItIs) {
 }
 
 TEST_F(WgslRun, WrongTextsAreCaught) {
-  if (!has_chromium()) GTEST_SKIP() << "no chromium (Debian: chromium) to compile and run WGSL";
+  if (!has_shader_compiler("wgsl")) GTEST_SKIP() << no_shader_compiler;
   const Model& model = find_model("burley");
   const std::vector<float> pairs = float_pairs(std::size_t{1} << 10, false);
   const std::vector<ParameterValues> sets = parameter_sets(model, 1);
