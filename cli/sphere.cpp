@@ -119,7 +119,7 @@ void write_difference(const SphereImage& a, const SphereImage& b, const std::str
 
 /// Refused now rather than after the work.
 void check_outputs(const SphereArguments& a, bool force) {
-  if (a.difference.empty() != a.against.empty() && !a.difference.empty()) {
+  if (!a.difference.empty() && a.against.empty()) {
     throw Error(ExitCode::usage, "a difference needs two spheres", "--difference", "give the other one to --against");
   }
   for (const std::string& path : {a.output, a.difference}) {
