@@ -152,6 +152,25 @@ Source find_source(const std::string& name, const std::vector<std::string>& sett
           {values.flat().begin(), values.flat().end()}};
 }
 
+std::function<std::optional<Rgb>(const Direction& wi, const Direction& wo)> brdf_of(const Source& source) {
+  if (source.integrator) {
+    if (!source.integrator->has_exact()) {
+      throw Error(ExitCode::usage, "the reference is known by Monte Carlo alone", source.label,
+                  "render a table of it, and give that");
+    }
+    return [evaluate = source.evaluate](const Direction& wi, const Direction& wo) {
+      return std::optional<Rgb>(evaluate(wi, wo));
+    };
+  }
+  return [evaluate = source.evaluate](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
+    try {
+      return evaluate(wi, wo);
+    } catch (const Error&) {
+      return std::nullopt;
+    }
+  };
+}
+
 ModelChoice find_model_or_fit(const std::string& name, const std::vector<std::string>& settings) {
   ModelChoice choice;
   if (is_file(name)) {

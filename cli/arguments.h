@@ -89,6 +89,8 @@ struct Source {
 /// One parameter row of a file: that of `settings`; a table without axes has one. Throws Error(usage).
 std::size_t find_row(const Table& table, const std::vector<std::string>& settings);
 Source find_source(const std::string& name, const std::vector<std::string>& settings);
+/// The source's values, nothing where a file has none. Throws Error(usage) for a reference without quadrature.
+std::function<std::optional<Rgb>(const Direction& wi, const Direction& wo)> brdf_of(const Source& source);
 /// Parameters as JSON: numbers, lists, choices by name.
 Json parameters_json(const ParameterValues& values);
 

@@ -3,8 +3,8 @@
 
 #include "cli/arguments.h"
 #include "cli/gbuffer_export.h"
-#include "cli/shader_text.h"
 #include "evaluate/shader.h"
+#include "report/shader_text.h"
 
 namespace lobefit {
 

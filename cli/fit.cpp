@@ -4,10 +4,10 @@
 #include <iostream>
 
 #include "cli/fit_batch.h"
-#include "cli/fit_text.h"
 #include "cli/metrics_text.h"
 #include "reference/formats/neural_brdf.h"
 #include "reference/output_file.h"
+#include "report/fit_text.h"
 #include "report/material_figure.h"
 
 namespace lobefit {

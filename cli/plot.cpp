@@ -81,18 +81,6 @@ SphereBrdf brdf_of(const Model& model, std::vector<double> flat) {
   };
 }
 
-/// What tables lack leaves a hole.
-SphereBrdf brdf_of(const Source& source) {
-  return [source](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
-    try {
-      return source.evaluate(wi, wo);
-    } catch (const Error&) {
-      if (source.integrator) throw;
-      return std::nullopt;
-    }
-  };
-}
-
 /// NAME and what --with names: over one row of a table, which gives models its parameters, or with parameters of their
 /// own.
 std::vector<LabelledBrdf> image_slice_brdfs(const PlotArguments& a) {

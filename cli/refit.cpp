@@ -7,11 +7,9 @@
 
 #include "cli/arguments.h"
 #include "cli/constants_page.h"
-#include "cli/fit_text.h"
 #include "cli/output_folder.h"
 #include "cli/refit_approximations.h"
 #include "cli/refit_curves.h"
-#include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
 #include "evaluate/check.h"
 #include "evaluate/shader.h"
@@ -20,6 +18,8 @@
 #include "reference/output_file.h"
 #include "reference/targets.h"
 #include "report/figure.h"
+#include "report/fit_text.h"
+#include "report/shader_text.h"
 
 namespace lobefit {
 

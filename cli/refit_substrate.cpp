@@ -4,7 +4,6 @@
 #include <iostream>
 
 #include "cli/output_folder.h"
-#include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
 #include "cli/table_file.h"
 #include "evaluate/shader.h"
@@ -14,6 +13,7 @@
 #include "reference/render.h"
 #include "reference/substrate/tree_json.h"
 #include "report/chart.h"
+#include "report/shader_text.h"
 #include "report/slab_validation.h"
 
 namespace lobefit {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cli/fit_text.h"
 #include "cli/report_folder.h"
 #include "reference/metric.h"
+#include "report/fit_text.h"
 
 namespace lobefit {
 
@@ -151,12 +151,8 @@ HtmlSphere sphere_of(const Model& model, const ParameterValues& values, const Ta
 
 /// Throws if the table is not that on which the result stands.
 void check_rms(const Table& table, const std::vector<float>& values, const JsonReader& line, const char* label) {
-  const JsonReader domain = line.at("domain"), stated = line.at("rms").at(label);
-  const Quantity quantity = parse_quantity(domain.at("metric").text());
-  std::string weights;
-  for (const std::string& name : texts(domain.at("weights"))) weights += (weights.empty() ? "" : ",") + name;
-  const double rms = rms_difference(
-      table, values, quantity, entry_weights(table, parse_weights(weights.empty() ? "uniform" : weights), quantity));
+  const JsonReader stated = line.at("rms").at(label);
+  const double rms = domain_rms(line.at("domain"), table, values);
   if (std::abs(rms - stated.number()) > 1e-6 * rms + 1e-9) {
     throw stated.error(fmt::format("the folder's table and fit give {:.9g}", rms), "run the recipe again");
   }
@@ -206,8 +202,7 @@ void add_drawings(const NamedRow& named, const fs::path& folder, const JsonReade
     }
     row.slices.lines.push_back({label, of_refit});
   }
-  const bool surface =
-      row.explorer.model && row.explorer.model->info->kind == ModelKind::brdf && !row.explorer.model->info->transmits;
+  const bool surface = row.explorer.model && is_opaque_surface(*row.explorer.model);
   const bool shader = std::ranges::find(row.shaders, "glsl", &HtmlShader::language) != row.shaders.end();
   if (!surface || !shader) row.explorer = {};
 }

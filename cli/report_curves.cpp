@@ -6,9 +6,9 @@
 #include <set>
 
 #include "cli/report_folder.h"
-#include "cli/shader_text.h"
 #include "evaluate/shader.h"
 #include "reference/metric.h"
+#include "report/shader_text.h"
 
 namespace lobefit {
 
@@ -181,16 +181,11 @@ std::vector<float> rendered(const Model& model, const Table& table, const Contes
                             const std::vector<JsonReader>& rows, HtmlSphere& sphere) {
   std::vector<float> values;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    const JsonReader domain = rows[k].at("domain"), stated = rows[k].at("rms").at("refit");
+    const JsonReader stated = rows[k].at("rms").at("refit");
     const Table slice = table.row_slice(k);
     sphere.rows.push_back(row_values(model, rows[k]));
     const std::vector<float> part = TableModel(model, as_values(model, sphere.rows.back()), slice).render().values;
-    const Quantity quantity = parse_quantity(domain.at("metric").text());
-    std::string weights;
-    for (const std::string& name : texts(domain.at("weights"))) weights += (weights.empty() ? "" : ",") + name;
-    const std::vector<double> shares =
-        entry_weights(slice, parse_weights(weights.empty() ? "uniform" : weights), quantity);
-    const double rms = rms_difference(slice, part, quantity, shares) / contest.albedo;
+    const double rms = domain_rms(rows[k].at("domain"), slice, part) / contest.albedo;
     if (std::abs(rms - stated.number()) > 1e-5 * rms + 1e-9)
       throw stated.error(fmt::format("the folder's table and the row's parameters give {:.9g}", rms),
                          "run the recipe again");

@@ -6,10 +6,10 @@
 
 #include "cli/fit_job.h"
 #include "cli/report_folder.h"
-#include "cli/shader_text.h"
 #include "evaluate/shader.h"
 #include "reference/metric.h"
 #include "reference/output_file.h"
+#include "report/shader_text.h"
 
 namespace lobefit {
 
@@ -145,8 +145,7 @@ void add_fit_quality(const JsonReader& result, const JsonReader& parameters, con
 
 HtmlRow fit_row(const std::string& name, const FolderFit& found, bool with_table, bool all_languages,
                 const std::string& command, std::vector<std::string>& remarks) {
-  const Json json = parse_json(read_file(found.path), found.path.string());
-  const JsonReader reader(json, found.path.string());
+  const JsonReader reader(found.document, found.path.string());
   const FitProvenance provenance = fit_provenance(found.path.string());
   const Model& model = find_model(found.fit.model);
   const ParameterValues values = found.fit.values();
@@ -165,7 +164,7 @@ HtmlRow fit_row(const std::string& name, const FolderFit& found, bool with_table
     row.shaders.push_back(
         {language, shader_text(model, values, &found.fit, language, command, "Fitted constants of " + name)});
   }
-  const bool surface = model.info->kind == ModelKind::brdf && !model.info->transmits;
+  const bool surface = is_opaque_surface(model);
   if (surface)
     row.explorer = {.model = &model, .spheres = {{"fitted", {{values.flat().begin(), values.flat().end()}}}}};
   if (!with_table) return row;
@@ -208,11 +207,11 @@ std::vector<fs::path> folder_fits(const fs::path& folder) {
 
 HtmlReport fits_report(const std::vector<fs::path>& paths, const std::string& command) {
   HtmlReport report;
+  const bool complete = paths.size() <= most_complete_fits;
   HtmlTable errors{.caption = "Errors", .header = {"fit", "model", "state", "metric", "rms", "held-out rms"}};
   for (const fs::path& path : paths) {
     const FolderFit found = *folder_fit(path);
-    const Json json = parse_json(read_file(path), path.string());
-    const JsonReader reader(json, path.string());
+    const JsonReader reader(found.document, path.string());
     std::string name = path.stem().string();
     if (name.ends_with(".fit")) name.resize(name.size() - 4);
     const std::string metric = fit_provenance(path.string()).metric;
@@ -223,15 +222,13 @@ HtmlReport fits_report(const std::vector<fs::path>& paths, const std::string& co
     errors.lines.push_back({name, found.fit.model,
                             reader.at("solver").at("converged").boolean() ? "converged" : "not converged", metric,
                             text("metrics"), text("holdout")});
-    report.rows.push_back(fit_row(name, found, paths.size() <= most_complete_fits, paths.size() <= most_complete_fits,
-                                  command, report.remarks));
+    report.rows.push_back(fit_row(name, found, complete, complete, command, report.remarks));
     const JsonReader provenance = reader.at("provenance");
     if (paths.size() > 1) continue;
     report.title = found.fit.model + " fitted to " +
                    (provenance.has("table") ? fs::path(provenance.at("table").text()).filename().string() : name);
     report.command = provenance.at("command").text();
-    for (const auto& [key, member] : provenance.members())
-      report.provenance.emplace_back(key, member.value().is_string() ? member.text() : member.value().dump());
+    add_provenance(provenance, report);
   }
   if (paths.size() > 1) report.title = fmt::format("{} fits", paths.size());
   report.tables = {errors};

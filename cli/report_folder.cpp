@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "evaluate/shader.h"
+#include "reference/metric.h"
 #include "reference/output_file.h"
 
 namespace lobefit {
@@ -68,9 +69,10 @@ std::vector<HtmlShader> folder_shaders(const fs::path& folder, const std::string
 
 std::optional<FolderFit> folder_fit(const fs::path& path) {
   if (!is_there(path)) return std::nullopt;
-  const Json json = parse_json(read_file(path), path.string());
-  return FolderFit{path, Fit::from_json(json, path.string()),
-                   JsonReader(json, path.string()).at("provenance").at("table_sha256").text()};
+  Json json = parse_json(read_file(path), path.string());
+  Fit fit = Fit::from_json(json, path.string());
+  std::string sha256 = JsonReader(json, path.string()).at("provenance").at("table_sha256").text();
+  return FolderFit{path, std::move(json), std::move(fit), std::move(sha256)};
 }
 
 std::string joined(const std::vector<std::string>& names) {
@@ -85,6 +87,21 @@ std::vector<std::string> texts(const JsonReader& list) {
   return result;
 }
 
+void add_provenance(const JsonReader& provenance, HtmlReport& report) {
+  for (const auto& [name, member] : provenance.members())
+    report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
+}
+
+double domain_rms(const JsonReader& domain, const Table& table, const std::vector<float>& values) {
+  const Quantity quantity = parse_quantity(domain.at("metric").text());
+  std::string weights;
+  for (const std::string& name : texts(domain.at("weights"))) weights += (weights.empty() ? "" : ",") + name;
+  return rms_difference(table, values, quantity,
+                        entry_weights(table, parse_weights(weights.empty() ? "uniform" : weights), quantity));
+}
+
+bool is_opaque_surface(const Model& model) { return model.info->kind == ModelKind::brdf && !model.info->transmits; }
+
 HtmlReport report_head(const JsonReader& result) {
   const JsonReader provenance = result.at("provenance");
   // Results of older versions state neither title nor description.
@@ -92,9 +109,7 @@ HtmlReport report_head(const JsonReader& result) {
                     .description = result.has("description") ? result.at("description").text() : "",
                     .conclusion = result.at("conclusion").text(),
                     .command = provenance.at("command").text()};
-  for (const auto& [name, member] : provenance.members()) {
-    report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
-  }
+  add_provenance(provenance, report);
   if (result.has("checks")) {
     // Of constants the check stands beside what it is of; of forms the two are one.
     const std::vector<JsonReader> checks = result.at("checks").elements();

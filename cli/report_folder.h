@@ -51,6 +51,7 @@ std::vector<HtmlShader> folder_shaders(const std::filesystem::path& folder, cons
 /// A fit's file with the table that it was made on; nothing if the folder lacks the file. Throws Error(invalid_input).
 struct FolderFit {
   std::filesystem::path path;
+  Json document;
   Fit fit;
   std::string table_sha256;
 };
@@ -74,6 +75,12 @@ void add_fit_quality(const JsonReader& result, const JsonReader& parameters, con
 /// "a, b"
 std::string joined(const std::vector<std::string>& names);
 std::vector<std::string> texts(const JsonReader& list);
+/// Every member of a result's "provenance".
+void add_provenance(const JsonReader& provenance, HtmlReport& report);
+/// rms of a model's values from a table over a row's "domain", in its metric and with its weights.
+double domain_rms(const JsonReader& domain, const Table& table, const std::vector<float>& values);
+/// Whether a sphere shows what the model is.
+bool is_opaque_surface(const Model& model);
 /// Title, conclusion, provenance: what all results have in common.
 HtmlReport report_head(const JsonReader& result);
 

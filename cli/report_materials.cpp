@@ -57,8 +57,7 @@ HtmlReport materials_report(const fs::path& folder, const JsonReader& summary, c
   HtmlReport report{.title = fmt::format("{} fitted to {} materials", model_name, fits.size()),
                     .command = provenance.at("command").text()};
   report.tables = {errors_table(summary), spread_table(summary)};
-  for (const auto& [name, member] : provenance.members())
-    report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
+  add_provenance(provenance, report);
 
   FolderFigures figures(folder);
   const bool complete = fits.size() <= most_complete_fits;

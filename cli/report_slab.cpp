@@ -156,8 +156,7 @@ HtmlReport slab_report(const fs::path& folder, const JsonReader& validation) {
                              (validation.has("title") ? validation.at("title").text() : std::string("a tree")) +
                              " costs",
                     .command = command};
-  for (const auto& [name, member] : provenance.members())
-    report.provenance.emplace_back(name, member.value().is_string() ? member.text() : member.value().dump());
+  add_provenance(provenance, report);
   HtmlRow row = validation_row("Stages of simplifying", validation);
   const fs::path rules = shipped_rules();
   if (is_there(rules) && provenance.has("rules_sha256") &&

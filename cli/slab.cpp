@@ -5,7 +5,6 @@
 
 #include "cli/arguments.h"
 #include "cli/output_folder.h"
-#include "cli/shader_text.h"
 #include "cli/substrate_rules.h"
 #include "evaluate/shader.h"
 #include "evaluate/substrate_storage_error.h"
@@ -15,6 +14,7 @@
 #include "reference/substrate/tree_albedo.h"
 #include "reference/substrate/tree_json.h"
 #include "report/figure.h"
+#include "report/shader_text.h"
 #include "report/slab_validation.h"
 #include "report/tree_figure.h"
 

@@ -52,24 +52,6 @@ std::string lighting_text(const SphereArguments& a) {
                                 : "light " + a.light;
 }
 
-/// What lacks a value leaves a hole; a reference without quadrature is an error.
-SphereBrdf brdf_of(const Source& source) {
-  if (source.integrator) {
-    if (!source.integrator->has_exact()) {
-      throw Error(ExitCode::usage, "the reference is known by Monte Carlo alone", source.label,
-                  "render a table of it, and give that");
-    }
-    return [&source](const Direction& wi, const Direction& wo) { return std::optional<Rgb>(source.evaluate(wi, wo)); };
-  }
-  return [&source](const Direction& wi, const Direction& wo) -> std::optional<Rgb> {
-    try {
-      return source.evaluate(wi, wo);
-    } catch (const Error&) {
-      return std::nullopt;
-    }
-  };
-}
-
 LightProposal proposal_of(const Source& source) {
   if (!source.model || !source.model->sample) return any_lobe_proposal();
   return {
@@ -124,9 +106,7 @@ void check_outputs(const SphereArguments& a, bool force) {
   }
   for (const std::string& path : {a.output, a.difference}) {
     if (path.empty()) continue;
-    if (!path.ends_with(".png") && !path.ends_with(".exr")) {
-      throw Error(ExitCode::usage, "no picture format has the extension of '" + path + "'", path, "use .png or .exr");
-    }
+    check_picture_extension(path);
     OutputFile(path, force);
   }
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "cli/shader_text.h"
 #include "evaluate/description.h"
 #include "evaluate/float_model.h"
 #include "python/arrays.h"
@@ -11,6 +10,7 @@
 #include "python/module.h"
 #include "reference/albedo.h"
 #include "reference/references.h"
+#include "report/shader_text.h"
 
 namespace lobefit::python {
 

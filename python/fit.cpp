@@ -1,12 +1,12 @@
 // Fits, as their JSON documents.
-#include "cli/fit_text.h"
-#include "cli/shader_text.h"
 #include "fit/fit_settings.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "reference/json_reader.h"
 #include "reference/output_file.h"
+#include "report/fit_text.h"
+#include "report/shader_text.h"
 
 namespace lobefit::python {
 

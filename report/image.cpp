@@ -46,11 +46,14 @@ void write_false_colour(std::span<const float> values, std::size_t width, std::s
   file.commit();
 }
 
+void check_picture_extension(const std::filesystem::path& path) {
+  if (path.extension() == ".png" || path.extension() == ".exr") return;
+  throw Error(ExitCode::usage, "no picture format has the extension '" + path.extension().string() + "'", path.string(),
+              "use .png or .exr");
+}
+
 void write_picture(const SphereImage& image, double exposure, const std::filesystem::path& path, bool overwrite) {
-  if (path.extension() != ".png" && path.extension() != ".exr") {
-    throw Error(ExitCode::usage, "no picture format has the extension '" + path.extension().string() + "'",
-                path.string(), "use .png or .exr");
-  }
+  check_picture_extension(path);
   OutputFile file(path, overwrite);
   const auto scale = static_cast<float>(std::exp2(exposure));
   std::vector<float> rgba(4 * image.pixels());

@@ -14,6 +14,9 @@ namespace lobefit {
 void write_false_colour(std::span<const float> values, std::size_t width, std::size_t height,
                         const std::filesystem::path& path, bool overwrite);
 
+/// Throws Error(usage) unless the extension is one of those that write_picture() writes.
+void check_picture_extension(const std::filesystem::path& path);
+
 /// RGBA, alpha the cover and colours multiplied by it: .exr as linear 32-bit floats, .png as 8-bit sRGB. Radiance times
 /// 2^exposure; what then exceeds 1 is white in a PNG. Errors as above; Error(usage) for another extension.
 void write_picture(const SphereImage& image, double exposure, const std::filesystem::path& path, bool overwrite);

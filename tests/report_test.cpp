@@ -2,7 +2,6 @@
 #include "report/html_report.h"
 
 #include <gtest/gtest.h>
-#include <openssl/evp.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +17,7 @@
 #include "evaluate/shader.h"
 #include "reference/output_file.h"
 #include "report/html_page.h"
+#include "tests/base64.h"
 #include "tests/shader_compiler.h"
 
 namespace lobefit {
@@ -48,15 +48,10 @@ Json page_data(const std::string& page) {
 
 /// One packed array, by the format's own words: half floats (IEEE 754 binary16), little-endian, base64, times a scale.
 std::vector<double> unpacked(const Json& array) {
-  const std::string text = array.at("data");
-  std::string bytes(text.size(), '\0');
-  int size = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
-                             reinterpret_cast<const unsigned char*>(text.data()), static_cast<int>(text.size()));
-  size -= static_cast<int>(std::ranges::count(text, '='));
+  const std::string bytes = bytes_of_base64(array.at("data"));
   std::vector<double> values;
-  for (int k = 0; k + 1 < size; k += 2) {
-    const unsigned bits = static_cast<unsigned char>(bytes[static_cast<std::size_t>(k)]) +
-                          256u * static_cast<unsigned char>(bytes[static_cast<std::size_t>(k) + 1]);
+  for (std::size_t k = 0; k + 1 < bytes.size(); k += 2) {
+    const unsigned bits = static_cast<unsigned char>(bytes[k]) + 256u * static_cast<unsigned char>(bytes[k + 1]);
     const int exponent = static_cast<int>(bits >> 10 & 31u);
     const double fraction = bits & 1023u, sign = bits & 0x8000u ? -1.0 : 1.0;
     const double value = exponent == 31  ? (fraction > 0.0 ? std::nan("") : INFINITY)

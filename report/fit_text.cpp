@@ -1,4 +1,4 @@
-#include "cli/fit_text.h"
+#include "report/fit_text.h"
 
 #include <fmt/format.h>
 

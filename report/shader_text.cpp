@@ -1,4 +1,4 @@
-#include "cli/shader_text.h"
+#include "report/shader_text.h"
 
 #include <fmt/format.h>
 
